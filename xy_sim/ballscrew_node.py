@@ -1,8 +1,8 @@
 """The adapter around ``machine.Machine``: answers every voltage block with the positions at its samples' instants.
 
-It steps when a block comes, so it runs in lockstep with whoever sends them, in real time or many times faster. When the
-voltage stops, time stands still, unless ``realtime`` is on: then the drive holds the last voltage until its ``watchdog``
-takes it away (or for ever, without one), the table moves on, and the encoder goes on reporting.
+It steps when a block arrives, so it runs in lockstep with the sender, in real time or many times faster. Without
+voltage, time stops, unless ``realtime`` is on: then the drive holds the last voltage until its ``watchdog``
+removes it (without one, permanently), the table moves on, and the encoder continues to report.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.samples.block import Block
 from xy_sysid.settings import BallscrewSettings
 
-GO_ON = 0.005  # s between two looks whether the table must move on by itself
-LATE = 0.02  # s that a block may be late before it does
-OTHER = 0.5  # s by which the time of counter 0 must differ for a voltage to come from a source that has started again
-IDLE = 0.1  # s without voltage after which the encoder reports by itself, the motors off
+GO_ON = 0.005  # s between two checks whether the table must move on by itself
+LATE = 0.02  # s that a block may be late before the table moves on
+OTHER = 0.5  # s by which the time of counter 0 must differ to count as a restart of the voltage source
+IDLE = 0.1  # s without voltage after which the encoder reports by itself, with the motors off
 
 
 class BallscrewNode(WalledNode):
@@ -37,12 +37,12 @@ class BallscrewNode(WalledNode):
         self._own = declare(self, BallscrewSettings(), self._accept, fixed=None)
         settings = self._own.settings
         self._machine = Machine.from_file(settings.machine, settings.seed or None, settings.clean)
-        self._machine.step(np.zeros((1, len(self._machine.axes))))  # compile before anybody waits
+        self._machine.step(np.zeros((1, len(self._machine.axes))))  # compile in advance
         self._machine.reset()
         self._next: int | None = None
         self._until = 0.0  # when the last block is over, s by the steady clock
         self._heard = time.monotonic()
-        self._epoch = 0.0  # s, time of the sample with counter 0, as the voltage has it
+        self._epoch = 0.0  # s, time of the sample with counter 0, from the voltage stream
         self._faults: dict[str, int] = {}
         self._recent = Recent()
         self._said = "waiting for voltage"
@@ -76,7 +76,7 @@ class BallscrewNode(WalledNode):
 
     def _answer(self, block: Block) -> None:
         if self._own.settings.realtime and self._next is not None and block.seq[0] < self._next <= block.seq[-1]:
-            late = int(self._next - block.seq[0])  # the table has moved on meanwhile
+            late = int(self._next - block.seq[0])  # the table has moved on in the meantime
             self._fault("late", f"{late} samples of voltage came after their time")
             block = Block(block.axes, block.seq[late:], block.time[late:], block.values[late:])
         first = int(block.seq[0])

@@ -1,4 +1,4 @@
-"""A stand-in for a robot under ros2_control: joint_state_broadcaster and a forward controller around a simulated machine.
+"""A substitute for a robot with ros2_control: joint_state_broadcaster and a forward controller around a simulated machine.
 
 Same topics, types, quality of service and order of things as a controller manager: each period of the steady clock it reads the
 joints (position, and the effort of the period before), publishes ``joint_states`` with the ROS time of the reading, takes the newest
@@ -57,7 +57,7 @@ class ControllerNode(Node):
         if len(joints) != len(machine.axes):
             raise BadInput("joints", ", ".join(joints), f"{len(machine.axes)} names", "Name each axis of the machine.")
         self._machine, self._joints, self._period = machine, joints, 1.0 / rate
-        machine.step(np.zeros((1, len(joints))))  # compile before anybody waits
+        machine.step(np.zeros((1, len(joints))))  # compile in advance
         self._random = np.random.default_rng(machine.seed + 1)
         self._command: FloatArray | None = None
         self.heard: tuple[float, ...] = ()
@@ -72,7 +72,7 @@ class ControllerNode(Node):
         self.get_logger().info(f"{', '.join(joints)} under {controller} at {rate:g} Hz")
 
     def _listen(self, joints: list[str]) -> str:
-        """Subscribe to commands; the name of the controller and of what it takes."""
+        """Subscribe to commands; returns the name of the controller and its kind of command."""
         controller = str(self.declare_parameter("controller", "/forward_command_controller").value)
         commands = f"{controller}/commands"
         self.create_subscription(Float64MultiArray, commands, self._on_command, qos_profile_system_default)
@@ -97,12 +97,12 @@ class ControllerNode(Node):
             time.sleep(max(-late, 0.0))
 
     def _cycle(self, missed: int) -> None:
-        """Read, update, write. missed: periods since the last cycle that had none."""
+        """Read, update, write. missed: number of skipped periods since the last cycle."""
         if missed:
             self._machine.step(np.repeat(self._effort[None, :], missed, axis=0))
             self._position = self._read()
         speed = (self._position - self._before) / (self._period * (1 + missed))
-        names = ["gripper", *reversed(self._joints)]  # there are others, too, in any order
+        names = ["gripper", *reversed(self._joints)]  # other joints are included, in any order
         self._states.publish(
             JointState(
                 header=self._header(),
@@ -118,7 +118,7 @@ class ControllerNode(Node):
         self._before, self._position = self._position, self._read()
 
     def _read(self) -> FloatArray:
-        """(joints,) what the encoders of the motors show now, rad."""
+        """(joints,) present readings of the motors' encoders, rad."""
         drives = [axis.drive for axis in self._machine.spec.axes]
         count = np.array([drive.count for drive in drives])
         noise = np.array([drive.encoder_noise for drive in drives]) * self._random.standard_normal(len(drives))
@@ -131,7 +131,7 @@ class ControllerNode(Node):
         return header
 
     def _update(self, command: FloatArray | None, speed: FloatArray) -> FloatArray:
-        """The effort: the command itself, or what the loop makes of it."""
+        """The effort: the command itself, or the output of the loop."""
         if command is None:
             return np.zeros(len(self._joints))
         if self._interface == "effort":
@@ -142,25 +142,25 @@ class ControllerNode(Node):
         return np.asarray(self._stiffness * (command - self._position) - self._damping * speed)
 
     def ask_to_stop(self, reason: str) -> None:
-        """The clock stops."""
+        """Stop the clock."""
         self._over.set()
 
     def has_stopped(self) -> bool:
-        """It does."""
+        """True at once."""
         return not self._thread.is_alive()
 
     def last_words(self) -> None:
-        """None."""
+        """Nothing to publish."""
         self._over.set()
         self._thread.join()
 
 
 def in_real_time() -> bool:
-    """Ask for real-time priority for every thread of this process, as none can go on without the interpreter; False where it is not allowed."""
+    """Request real-time priority for every thread of this process (all need the interpreter); False if it is not allowed."""
     try:
         for thread in Path("/proc/self/task").iterdir():
             os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except (OSError, AttributeError):  # no right to it, or no Linux
+    except (OSError, AttributeError):  # not permitted, or not Linux
         return False
     return True
 

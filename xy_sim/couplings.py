@@ -1,11 +1,11 @@
-"""What two axes do to each other: axes that are not perpendicular, and a base that carries both and swings.
+"""Coupling of two axes: axes that are not perpendicular, and a common base that oscillates.
 
-The encoders read the table in a right-angled frame that is fixed to the base. With q the motion of each axis, r what is read, a the skew, d the
+The encoders read the table in a right-angled frame that is fixed to the base. q is the motion of each axis, r the reading, a the skew, d the
 direction in which the base swings, m the masses of the tables and M that of the base:
 
     r_1 = q_1 + sin(a) q_2 - cos(d) b,   r_2 = cos(a) q_2 - sin(d) b,   M (b'' + 2 zeta w b' + w^2 b) = -(cos(d) m_1 q_1'' + sin(d) m_2 q_2'')
 
-The base is heavy: how it moves does not act back on the drives.
+The base is heavy: its motion does not affect the drives.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Couplings(Settings):
 
     @property
     def any(self) -> bool:
-        """Whether one axis moves the other at all."""
+        """True if one axis moves the other."""
         return self.skew != 0.0 or self.base_mass > 0.0
 
 
@@ -57,8 +57,8 @@ class Coupled:
         return [1.0, 0.0, 0.0], [1.0, 2.0 * self._damping * self._omega, self._omega**2]
 
     def seen(self, motion: FloatArray) -> FloatArray:
-        """(n, 2) of the encoders, of the (n, 2) motion of the axes."""
-        one, other = motion[:, 0], motion[:, 1]  # summed by hand: a product of matrices rounds otherwise for other lengths
+        """(n, 2) encoder readings for the (n, 2) motion of the axes."""
+        one, other = motion[:, 0], motion[:, 1]  # summed by hand: a matrix product rounds differently for other lengths
         swings, self._state = scipy.signal.lfilter(
             self._numerator, self._denominator, one * self._pushes[0] + other * self._pushes[1], zi=self._state
         )
@@ -66,6 +66,6 @@ class Coupled:
         return np.column_stack(read)
 
     def mixing(self, frequency: FloatArray) -> NDArray[np.complex128]:
-        """(n, 2, 2) what encoder i reads, over the motion of axis j, at these frequencies, Hz."""
+        """(n, 2, 2) reading of encoder i over the motion of axis j, at these frequencies, Hz."""
         _, swings = scipy.signal.freqs(*self._swing, worN=2.0 * np.pi * np.asarray(frequency))
         return np.asarray(self._frame + swings[:, None, None] * np.outer(self._along, self._pushes))

@@ -13,18 +13,18 @@ from xy_sim.parts.contract import Parameter, Part
 from xy_sysid.errors import BadInput
 
 Effects = int | str | tuple[int, int]
-_STREAM = 20_260  # keeps these random numbers apart from the encoder's, which come from the same seed
+_STREAM = 20_260  # separates these random numbers from the encoder's, which use the same seed
 
 
 def drawn(spec: Spec, seed: int | None) -> Spec:
-    """What the file's ``hidden`` group asks for; its own seed unless one is given."""
+    """The spec with the drawn parts of the file's ``hidden`` group; the file's seed by default."""
     group = dict(spec.hidden or {})
     chosen = int(group.get("seed", 1)) if seed is None else seed
     return with_drawn(spec, chosen, group.get("effects", "1..2"), float(group.get("scale", 1.0)))
 
 
 def with_drawn(spec: Spec, seed: int, effects: Effects, scale: float) -> Spec:
-    """The spec with drawn parts on every axis, each axis from random numbers of its own."""
+    """The spec with drawn parts on every axis; each axis has its own random numbers."""
     fewest, most, group = _asked(effects)
     axes = []
     for number, axis in enumerate(spec.axes):
@@ -49,7 +49,7 @@ def _size(parameter: Parameter, random: np.random.Generator, scale: float) -> fl
 
 
 def _asked(effects: Effects) -> tuple[int, int, str]:
-    """Fewest, most and the group to draw from."""
+    """Smallest and largest number of parts, and the group to draw from."""
     if effects == "none":
         return 0, 0, "effect"
     if effects == "outside":
@@ -61,7 +61,7 @@ def _asked(effects: Effects) -> tuple[int, int, str]:
 
 
 def _choose(axis: Axis, group: str, count: int, random: np.random.Generator) -> list[Part]:
-    """So many parts that the axis does not have, none that stands for another of its family."""
+    """``count`` parts that the axis does not have, none of which replaces another of its family."""
     chosen: list[Part] = []
     taken = {PARTS[name].family for name in axis.parts}
     for name in random.permutation(sorted(name for name, part in PARTS.items() if part.drawn)):

@@ -1,6 +1,6 @@
-"""How a JointTrajectoryController follows a trajectory: from point to point by polynomials, the newest trajectory first.
+"""The trajectory following of a JointTrajectoryController: from point to point by polynomials; the newest trajectory replaces others.
 
-After the open source of ros2_controllers, joint_trajectory_controller: what it refuses, what it passes over, how it interpolates.
+Modelled on ros2_controllers, joint_trajectory_controller: what it refuses, what it skips, how it interpolates.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """of a trajectory: s from its start, positions (joints,), and their derivatives or empty arrays."""
+    """A point of a trajectory: s from its start, positions (joints,), and their derivatives or empty arrays."""
 
     at: float
     position: FloatArray
@@ -24,7 +24,7 @@ class Point:
 
 
 class Following:
-    """``take`` a trajectory, ``now`` gives where the joints are to be."""
+    """``take`` reads a trajectory, ``now`` returns the reference of the joints."""
 
     def __init__(self, joints: Sequence[str]) -> None:
         """joints: in the order of the controller."""
@@ -34,7 +34,7 @@ class Following:
         self._begins = 0.0
 
     def take(self, names: Sequence[str], points: Sequence[Point], begins: float, now: float, state: Point) -> str:
-        """Replace what is followed; why it is refused, or nothing. begins: s, 0 is now; state: (joints,) where they are."""
+        """Replace the trajectory; returns why it is refused, or an empty text. begins: s, 0 is now; state: (joints,) present positions."""
         if sorted(names) != sorted(self._joints):
             return f"joints on incoming trajectory ({', '.join(names)}) don't match the controller joints ({', '.join(self._joints)})"
         times = np.array([point.at for point in points])
@@ -53,7 +53,7 @@ class Following:
         return ""
 
     def now(self, now: float) -> tuple[FloatArray, FloatArray] | None:
-        """(joints,) position and speed to be had; None before the first trajectory."""
+        """(joints,) reference position and speed; None before the first trajectory."""
         if not self._points:
             return None
         since = now - self._begins
@@ -65,7 +65,7 @@ class Following:
 
 
 def _between(one: Point, other: Point, since: float) -> tuple[FloatArray, FloatArray]:
-    """By the polynomial with the values that both ends know: of order 5, 3 or 1."""
+    """Polynomial interpolation of order 5, 3 or 1, from the derivatives that both ends have."""
     known = 1 + int(one.speed.size > 0 and other.speed.size > 0)
     known += int(known == 2 and one.push.size > 0 and other.push.size > 0)
     length = other.at - one.at

@@ -1,6 +1,6 @@
-"""Where dirt acts: one call for all of it, that machines without any never make.
+"""The imperfections ("dirt") in one call, which machines without them never make.
 
-The laws are in the parts; here is only how they come together.
+The laws are in the parts; this file combines them.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _LATE, _LATE_SEED = slot("late_drive.largest"), slot("late_drive.seed")
 
 @inlined
 def gain_and_drag(p: FloatArray, t: float, q: float) -> tuple[float, float]:
-    """Force per volt over its mean, and drag over its mean, at ``t`` (s) and ``q`` (m)."""
+    """Force per volt and drag, each relative to its mean, at ``t`` (s) and ``q`` (m)."""
     gain, drag = 1.0, 1.0
     if p[_WANDER] != 0.0:
         gain = curve.around_one(p, _WANDER_CURVE, p[_WANDER], t / p[_WANDER_TIME])
@@ -49,13 +49,13 @@ def hum(p: FloatArray, t: float) -> float:
 
 @inlined
 def friction(p: FloatArray, t: float) -> float:
-    """All friction over its mean, at ``t`` (s)."""
+    """Total friction relative to its mean, at ``t`` (s)."""
     return curve.around_one(p, _RUB_CURVE, p[_RUB], t / p[_RUB_TIME]) if p[_RUB] != 0.0 else 1.0
 
 
 @inlined
 def cable(p: FloatArray, y: FloatArray, i: int, x: float, v: float, o: int) -> float:
-    """Force of the cable on the table at ``x`` (m) and ``v`` (m/s), V; writes how its bend changes into row ``o`` of ``y``."""
+    """Force of the cable on the table at ``x`` (m) and ``v`` (m/s), V; writes the rate of its bend into row ``o`` of ``y``."""
     if p[_PULL] == 0.0:
         return 0.0
     z = y[i, CABLE]
@@ -80,7 +80,7 @@ def modes(p: FloatArray, y: FloatArray, i: int, x: float, v: float, o: int) -> f
 
 @inlined
 def on_a_moving_base(p: FloatArray, y: FloatArray, o: int, of_base: float) -> None:
-    """Weak modes are told relative to the base, which accelerates by ``of_base`` (m/s2)."""
+    """Convert the weak modes' rates to a base that accelerates by ``of_base`` (m/s2)."""
     if p[_MASS] > 0.0:
         y[o, WEAK_SPEED] -= of_base
     if p[_MASS2] > 0.0:
@@ -89,7 +89,7 @@ def on_a_moving_base(p: FloatArray, y: FloatArray, o: int, of_base: float) -> No
 
 @inlined
 def too_much(p: FloatArray, q: float, v: float, sample: int) -> float:
-    """What the encoder reads too much at ``q`` (m) and ``v`` (m/s), m."""
+    """Error of the encoder reading at ``q`` (m) and ``v`` (m/s), m."""
     late = sample_jitter.shift(p[_JITTER], p[_JITTER_SEED], v, sample)
     if p[_LINE] == 0.0:
         return late

@@ -1,6 +1,6 @@
-"""Functions that are compiled together with whatever compiled code calls them.
+"""Functions that are compiled together with the compiled code that calls them.
 
-They keep no cache of their own, so the one cache that counts, the kernel's, can be keyed on the text of them all.
+They have no cache of their own, so the kernel's cache can be keyed on the text of all of them.
 """
 
 from __future__ import annotations
@@ -21,6 +21,6 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def called(function: Callable[P, R]) -> Callable[P, R]:
-    """The same, but compiled once and called: for what most machines do not need, so that it makes the kernel no slower."""
+    """The same function, compiled once and called: for parts that few machines need, so that the kernel does not become slower."""
     compilable: Callable[P, R] = register_jitable(function)
     return compilable

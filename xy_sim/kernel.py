@@ -1,8 +1,8 @@
 """From held voltages to encoder positions: fixed fine steps, cut exactly at switching instants and at events.
 
 Between two switching instants of the delayed voltage the step is a fixed fraction of them, so a delay of any fraction
-of a sample is exact. Classical Runge-Kutta of order 4 in smooth motion; a step over which a contact or the direction of
-dry friction changes is halved until the change lies within 1/4096 of it. With ``first_order_steps`` none of that holds.
+of a sample is exact. Classical Runge-Kutta of order 4 in smooth motion. A step in which a contact or the direction of
+dry friction changes is halved until the change is located within 1/4096 of it. ``first_order_steps`` replaces all of this.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Run = Callable[[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatA
 
 ROWS = 7
 _NOW, _NEXT, _BETWEEN, _K1, _K2, _K3, _K4 = range(ROWS)  # rows of the state table
-_EVENT = 1.0 / 4096.0  # of a step: how finely an event is located; 6 ns of 25 us
+_EVENT = 1.0 / 4096.0  # of a step: accuracy of an event's time; 6 ns of 25 us
 _DRY, _COUPLED, _ON_TABLE = slot("dry"), slot("coupled"), slot("encoder_on_table")
 _COARSE, _PRE = slot("first_order_steps.step"), slot("presliding_hysteresis.coulomb")
 _PLACES = (MOTOR, BASE, TABLE, RATTLE, WEAK, SECOND_WEAK)  # each is followed by its speed
@@ -56,7 +56,7 @@ def _step(p: FloatArray, y: FloatArray, n: int, t: float, dt: float, volts: floa
 
 @inlined
 def _broken_loose(p: FloatArray, y: FloatArray, row: int, t: float, volts: float, dirt: FloatArray | None) -> int:
-    """0 if dry friction can hold a motor at rest in state ``row``, else the direction in which it starts."""
+    """0 if dry friction can hold a motor at rest in state ``row``, else the direction in which it starts to move."""
     needed = rates(p, y, row, t, volts, 0, _K1, dirt)
     direction = 1 if needed > 0.0 else -1
     return direction if abs(needed) > breakaway(p, t, float(direction), dirt) else 0
@@ -64,7 +64,7 @@ def _broken_loose(p: FloatArray, y: FloatArray, row: int, t: float, volts: float
 
 @inlined
 def _advance(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts: float, mode: int, dirt: FloatArray | None) -> int:
-    """Moves row NOW of ``y`` on by ``span`` (s) under a constant voltage; returns the friction mode at the end."""
+    """Advance row NOW of ``y`` by ``span`` (s) under a constant voltage; returns the friction mode at the end."""
     remaining, dt = span, span
     before = regime(p, y, _NOW)
     while remaining > 1e-9 * span:
@@ -94,7 +94,7 @@ def _advance(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts:
 
 @inlined
 def _first_order(p: FloatArray, y: FloatArray, n: int, t: float, dt: float, volts: float, mode: int, dirt: FloatArray | None) -> int:
-    """Moves row NOW on by ``dt`` (s) in one step of first order; a stop is found at its end. Returns the friction mode."""
+    """Advance row NOW by ``dt`` (s) in one first-order step; a stop is detected at its end. Returns the friction mode."""
     rates(p, y, _NOW, t, volts, mode, _K1, dirt)
     bristle = y[_NOW, BRISTLE]
     for i in range(n):
@@ -113,7 +113,7 @@ def _first_order(p: FloatArray, y: FloatArray, n: int, t: float, dt: float, volt
 
 @inlined
 def _piece(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts: float, mode: int, inner: float, dirt: FloatArray | None) -> int:
-    """Moves row NOW on by ``span`` (s) in equal steps no longer than 1 / ``inner``; returns the friction mode."""
+    """Advance row NOW by ``span`` (s) in equal steps no longer than 1 / ``inner``; returns the friction mode."""
     if mode == 0:
         mode = _broken_loose(p, y, _NOW, t, volts, dirt)
     steps = max(math.ceil(span * inner - 1e-9), 1)
@@ -124,7 +124,7 @@ def _piece(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts: f
 
 @inlined
 def _uncommon(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts: float, mode: int, inner: float, dirt: FloatArray | None) -> int:
-    """The same, with the steps that the machine asks for."""
+    """As ``_piece``, with the step method of the machine file."""
     if p[_COARSE] == 0.0:
         return _piece(p, y, n, t, span, volts, mode, inner, dirt)
     steps = max(math.ceil(span * inner - 1e-9), 1)
@@ -137,12 +137,12 @@ def _uncommon(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts
 def _uncommon_sample(
     p: FloatArray, y: FloatArray, n: int, past: FloatArray, sample: int, mode: int, rate: float, inner: float, dirt: FloatArray | None
 ) -> int:
-    """Moves row NOW on by a sample in which voltages may arrive early or late, or steps be coarse; returns the friction mode."""
+    """Advance row NOW by a sample with early or late voltages, or with coarse steps; returns the friction mode."""
     period, size = 1.0 / rate, past.shape[0]
     whole, _ = time_delay.samples(p[_DELAY], rate)
     begun, volts = 0.0, 0.0
     last = min(sample - whole + 1, sample)
-    for arriving in range(sample - whole - 2, last + 2):  # nothing arrives more than half a sample from its time
+    for arriving in range(sample - whole - 2, last + 2):  # nothing arrives more than half a sample early or late
         ending = period
         if arriving <= last:
             ending = min((arriving - sample) * period + imperfections.late(p, p[_DELAY], period, arriving), period)
@@ -205,7 +205,7 @@ def _build(_text: int) -> Run:
 
 
 def _fingerprint() -> int:
-    """Check sum of every file that is compiled into the loop."""
+    """Checksum of every file that is compiled into the loop."""
     folder = Path(__file__).parent
     files = sorted([*folder.glob("*.py"), *(folder / "parts").glob("*.py")])
     return zlib.crc32(b"".join(file.read_bytes() for file in files))

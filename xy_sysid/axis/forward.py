@@ -1,7 +1,7 @@
-"""An axis on its own: where it goes, and what voltage it gets, if nothing of its motion has been measured.
+"""Simulation of an axis without measured motion: its position, and its voltage with centring.
 
-``simulator`` takes the measured position wherever a law asks for the place. Here the place follows from the motion itself, and the
-excitation's pull back to the start follows from the place.
+``simulator`` uses the measured position wherever a law depends on position. Here the position follows from the simulated motion, and the
+excitation's centring follows from that position.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class DriveInput:
-    """What drives the axis.
+    """The drive of an axis.
 
-    voltage: (n,) V, without the pull; pull: (n,) V/m back to the start; limit: V; seen: samples by which the place is old where it pulls
-    start: m, the place at the first sample
+    voltage: (n,) V, without centring; pull: (n,) V/m, centring towards the start; limit: V; seen: age of the position in the centring, samples
+    start: m, the position at the first sample
     """
 
     voltage: FloatArray
@@ -32,7 +32,7 @@ class DriveInput:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What would be recorded without noise: voltage (n,), V, held to the next sample; position (n,), m, as the encoder shows it."""
+    """A recording without noise: voltage (n,), V, held to the next sample; position (n,), m, as the encoder shows it."""
 
     sampling_rate: float
     voltage: FloatArray
@@ -40,7 +40,7 @@ class Motion:
 
 
 def move(model: AxisModel, sampling_rate: float, drive: DriveInput, fine: float = FINE) -> Motion:
-    """The motion of an axis model from rest; fine: Hz, sub-steps for laws that heed speed."""
+    """The motion of an axis model from rest; fine: Hz, sub-steps for laws that depend on speed."""
     chosen = [model.library[name] for name, _ in model.effects]
     library = model.library.looped(chosen)
     row, on = np.ones(len(library.places)), np.zeros(len(library.acting), dtype=np.uint8)
@@ -52,7 +52,7 @@ def move(model: AxisModel, sampling_rate: float, drive: DriveInput, fine: float 
     n = drive.voltage.size
     place, speed, sent = np.zeros(n + 1), np.zeros(n), np.zeros(n)
     place[0] = drive.start
-    with np.errstate(all="ignore"):  # a model may run away
+    with np.errstate(all="ignore"):  # a model may diverge
         library.moving(
             np.ascontiguousarray(drive.voltage, dtype=np.float64),
             place,

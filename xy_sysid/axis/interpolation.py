@@ -1,4 +1,4 @@
-"""Between two samples of the encoder: where the axis is, and in how many sub-steps it gets there."""
+"""Between two encoder samples: the position of the axis, and the number of sub-steps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from xy_sysid.samples.block import FloatArray
 
 @compiled
 def along(x: FloatArray, i: int, part: float) -> float:
-    """Position a part (0..1) of the way from sample i to the next, m: on the parabola with the mean of both second differences."""
+    """Position at a fraction ``part`` (0..1) between sample i and the next, m: on the parabola with the mean of both second differences."""
     straight: float = x[i] + part * (x[i + 1] - x[i])
     if i == 0 or i + 2 >= x.shape[0]:
         return straight
@@ -20,5 +20,5 @@ def along(x: FloatArray, i: int, part: float) -> float:
 
 @compiled
 def pieces(part: float, cuts: float) -> tuple[int, int]:
-    """Sub-steps before and after the voltage changes, a part (0..1) of the sample on; none is longer than a sample / cuts."""
+    """Number of sub-steps before and after the voltage changes at a fraction ``part`` of the sample; none is longer than a sample / cuts."""
     return max(math.ceil(part * cuts), 1), max(math.ceil((1.0 - part) * cuts), 1)

@@ -1,6 +1,6 @@
-"""The linear part of an axis model as a transfer function: base, delay, resonances and lags, without friction and the like.
+"""The linear part of an axis model as a transfer function: base, delay, resonances and lags, without friction and other nonlinear effects.
 
-Which effects are linear is found by trying their laws, so that effects of users count too.
+Linear effects are found by evaluating their laws, so that users' own effects are included.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from xy_sysid.effects._contract import arguments
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.units import USUAL, Units
 
-FINE = 1e5  # Hz at which a section is asked for its roots: far above any resonance, where s = ln(z) fs is exact enough
-STEP = 1e-5  # s of the trial of a lag
+FINE = 1e5  # Hz at which the roots of a section are computed: far above any resonance, where s = ln(z) fs is accurate enough
+STEP = 1e-5  # s, step for the test of a lag
 
 
 def linear_part(model: AxisModel, units: Units = USUAL) -> TransferFunction:
@@ -31,19 +31,19 @@ def linear_part(model: AxisModel, units: Units = USUAL) -> TransferFunction:
 
 
 def nonlinear(model: AxisModel) -> tuple[str, ...]:
-    """Names of the effects that the linear part leaves out."""
+    """Names of the effects that are not in the linear part."""
     return tuple(name for name, values in model.effects if np.array_equal(_section(model.library[name], values), ([1.0], [1.0])))
 
 
 def sections(model: AxisModel, sampling_rate: float) -> tuple[tuple[float, ...], ...]:
-    """b0, b1, b2, a1, a2 of each section that the motion passes behind the base, at this rate (Hz)."""
+    """b0, b1, b2, a1, a2 of each section between the base's motion and the output, at this rate (Hz)."""
     passed = [(model.library[name], values) for name, values in model.effects if model.library[name].category == "motion"]
     laws = [(effect.functions["section"], effect, values) for effect, values in passed]
     return tuple(tuple(law(**_bound(law, effect, values, {"fs": sampling_rate}))) for law, effect, values in laws)
 
 
 def _section(effect: Effect, values: tuple[float, ...]) -> tuple[Any, Any]:
-    """Numerator and denominator with gain 1 at 0 Hz; 1 and 1 for an effect that is not linear."""
+    """Numerator and denominator with gain 1 at 0 Hz; 1 and 1 for a nonlinear effect."""
     if effect.category == "motion":
         b0, b1, b2, a1, a2 = effect.functions["section"](**_bound(effect.functions["section"], effect, values, {"fs": FINE}))
         return _polynomial([b0, b1, b2]), _polynomial([1.0, a1, a2])
@@ -52,7 +52,7 @@ def _section(effect: Effect, values: tuple[float, ...]) -> tuple[Any, Any]:
 
 
 def _polynomial(discrete: list[float]) -> Any:
-    """In s, 1 at 0 Hz, with the roots s = ln(z) fs; those at z = -1 are no roots in s, they end the band."""
+    """Polynomial in s, 1 at 0 Hz, with the roots s = ln(z) fs; roots at z = -1 have no counterpart in s and are dropped."""
     roots = np.roots(discrete)
     kept = np.log(roots[(np.abs(roots) > 1e-9) & (np.abs(roots + 1.0) > 1e-6)].astype(np.complex128)) * FINE
     found = np.real(np.atleast_1d(np.poly(kept)))
@@ -60,7 +60,7 @@ def _polynomial(discrete: list[float]) -> Any:
 
 
 def lag_of(effect: Effect, values: tuple[float, ...]) -> float | None:
-    """The time constant if the law is a first-order lag of the voltage, whatever speed, place and time; None of any other effect."""
+    """The time constant if the law is a first-order lag of the voltage, independent of speed, position and time; None for any other effect."""
     if effect.category != "state" or len(effect.states) != 1:
         return None
 

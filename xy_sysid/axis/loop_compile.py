@@ -1,4 +1,4 @@
-"""From the text of the loop to machine code, kept on disk for the next process (see ``jit``)."""
+"""From the text of the loop to machine code, cached on disk for other processes (see ``jit``)."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ Kernel = Callable[[FloatArray, FloatArray, FloatArray, NDArray[np.uint8], float,
 
 
 def build(effects: Sequence[Effect]) -> Kernel:
-    """The compiled loop of these effects; compiling happens at its first call, or never if the disk has it."""
+    """The compiled loop of these effects; it is compiled at its first call, or loaded from disk."""
     return cast("Kernel", _compiled(text, effects))
 
 
 def build_moving(effects: Sequence[Effect]) -> Moving:
-    """The compiled loop of an axis whose position follows from its own motion; see ``loop_source.moving``."""
+    """The compiled loop of an axis whose position follows from its simulated motion; see ``loop_source.moving``."""
     return cast("Moving", _compiled(moving, effects))
 
 
 def build_undoing(effects: Sequence[Effect]) -> Undoing:
-    """The compiled loop that takes these effects out of a recording."""
+    """The compiled loop that removes these effects from a recording."""
     return cast("Undoing", _compiled(undoing, [effect for effect in effects if undoable(effect)]))
 
 

@@ -1,7 +1,7 @@
-"""The text of one fused simulation loop, written from the laws of a set of effects.
+"""Generates the source text of one simulation loop from the laws of a set of effects.
 
-Every effect of the set is in the loop behind a flag, so that any combination runs without compiling again. What does
-not depend on speed is worked out before the loop, or once per piece of a sample.
+Every effect of the set is in the loop behind a flag, so that any combination runs without a new compilation. Terms that do
+not depend on speed are computed before the loop, or once per piece of a sample.
 """
 
 from __future__ import annotations
@@ -14,29 +14,29 @@ from xy_sysid.effects._binding import call
 from xy_sysid.effects._contract import Effect, arguments
 
 BASE = ("gain", "delay", "pole")
-GAUSS = 3.0**-0.5  # of half a piece: where its two places are
-SIDES = (("forth", "+", "1.0"), ("back", "-", "-1.0"))  # of a straight line: its slope is what it gives at 1 m/s
-PLACED = 2  # iterations: an error that changes by 1 per cent of the motion is known to 1e-4 of itself after them
+GAUSS = 3.0**-0.5  # of half a piece: the two evaluation points
+SIDES = (("forth", "+", "1.0"), ("back", "-", "-1.0"))  # slope of a straight line: its value at 1 m/s
+PLACED = 2  # iterations: if the error changes by 1 per cent of the motion, they determine it to 1e-4 of itself
 
 
 def slots(effects: Sequence[Effect]) -> dict[str, int]:
-    """Place of each parameter in the row of numbers: ``gain``, ``delay``, ``pole``, then ``effect.parameter``."""
+    """Index of each parameter in the row of numbers: ``gain``, ``delay``, ``pole``, then ``effect.parameter``."""
     names = [*BASE, *(f"{effect.name}.{name}" for effect in effects for name in effect.names)]
     return {name: place for place, name in enumerate(names)}
 
 
 def text(name: str, effects: Sequence[Effect]) -> str:
-    """Source of ``name(u, x, p, on, fs, fine, start, out)``.
+    """Source of ``name(u, x, p, on, fs, fine, start, out)``, which simulates the velocity.
 
     u: (n,) held voltage, V; x: (n + 1,) measured position, m; p: numbers in the order of ``slots``; on: (effects,) flags;
-    fs: Hz; fine: Hz, sub-steps of what heeds speed; start: speed at the first sample, m/s;
+    fs: Hz; fine: Hz, sub-steps of laws that depend on speed; start: speed at the first sample, m/s;
     out: (n,) receives the mean velocity of each sample, m/s.
     """
     return _loop(name, effects, {"more": "", "begins": "", "ends": "", "places": _places(effects), "inputs": _inputs(effects)}, _encoders(effects))
 
 
 def moving(name: str, effects: Sequence[Effect]) -> str:
-    """Source of ``name(u, x, p, on, fs, fine, start, out, centring, most, ago, sent)``: an axis whose position follows from its own motion.
+    """Source of ``name(u, x, p, on, fs, fine, start, out, centring, most, ago, sent)``: an axis whose position follows from its simulated motion.
 
     As ``text``, but x: (n + 1,) its first value is the place at the start, and the rest receives the place of the axis, m; u: (n,) the voltage
     wanted, V; centring: (n,) V/m back to the start, of the place ``ago`` samples ago; most: V; sent: (n,) receives the voltage applied, V.
@@ -80,11 +80,11 @@ def _loop(name: str, effects: Sequence[Effect], how: Mapping[str, str], encoders
 
 
 def undoing(name: str, effects: Sequence[Effect]) -> str:
-    """Source of ``name(u, x, p, on, fs, held, where, against)``: a recording as it were without some effects.
+    """Source of ``name(u, x, p, on, fs, held, where, against)``, which removes some effects from a recording.
 
     u, x, p, on, fs: as in ``text``; held: (n,) receives the voltage behind the amplifier, V; where: (n + 1,) the position of the
-    axis before resonances and the scale's errors, m; against: (2, n) forces against the drive, at the motor and on the table, V;
-    returns how much of a sudden change of ``where`` the encoder shows at once. Only effects of ``undoable``.
+    axis before resonances and the scale's errors, m; against: (2, n) forces against the drive, at the motor and at the table, V.
+    Returns the fraction of a sudden change of ``where`` that the encoder shows at once. Only for effects of ``undoable``.
     """
     return UNDOING.substitute(
         name=name,
@@ -102,14 +102,14 @@ def undoing(name: str, effects: Sequence[Effect]) -> str:
 
 
 def undoable(effect: Effect) -> bool:
-    """True if what the effect does follows from voltage, position and time alone."""
+    """True if the effect depends on voltage, position and time only."""
     if effect.category == "motion":
         return effect.can_be_undone
     return effect.category in ("input", "encoder") or (effect.category in ("force", "state") and not heeds_speed(effect))
 
 
 def bends(effect: Effect) -> bool:
-    """True if the law bends with speed: then it needs sub-steps."""
+    """True if the law is nonlinear in speed: then it needs sub-steps."""
     return needs_speed(effect) and not effect.straight
 
 
@@ -121,12 +121,12 @@ def needs_speed(effect: Effect) -> bool:
 
 
 def _asks_where(effect: Effect) -> bool:
-    """True for a force or a state whose law asks where the axis is, or when."""
+    """True for a force or a state whose law depends on position or time."""
     return effect.category in ("force", "state") and any({"x", "t"} & set(arguments(item)) for item in effect.functions.values())
 
 
 def heeds_speed(effect: Effect) -> bool:
-    """True if the law asks for the speed: then a resonance must be in the loop with it."""
+    """True if the law depends on speed: then a resonance must be in the loop with it."""
     if effect.is_dry:
         return True
     return effect.category in ("force", "state") and any("v" in arguments(item) for item in effect.functions.values())
@@ -176,7 +176,7 @@ def _inputs(effects: Sequence[Effect]) -> str:
 
 
 def _levels(effects: Sequence[Effect]) -> str:
-    """Levels at rest, both ways, and the part of them that does not depend on speed."""
+    """Friction levels at rest, in both directions, and their part that does not depend on speed."""
     lines = []
     for effect in _of(effects, "friction"):
         lines.append(f"if has_{effect.name}:")
@@ -189,7 +189,7 @@ def _levels(effects: Sequence[Effect]) -> str:
 
 
 def _slopes(effects: Sequence[Effect]) -> str:
-    """Drag by speed, both ways, of the forces that are straight lines there, V s/m."""
+    """Slopes over speed, in both directions, of forces that are linear in speed, V s/m."""
     words = {"gain": "gain", "pole": "pole"}
     lines = []
     for effect in effects:
@@ -204,7 +204,7 @@ def _states(effects: Sequence[Effect]) -> str:
 
 
 def _pulls(effects: Sequence[Effect], depth: int = 5) -> str:
-    """Mean of each force over the piece: at its middle in time, at two places if the law asks where (Gauss's rule)."""
+    """Mean of each force over the piece: at its middle in time, or at two positions if the law depends on position (Gauss's rule)."""
     words = {"x": "place", "t": "time", "u": "volts", "gain": "gain", "pole": "pole"}
     lines = []
     for effect in _of(effects, "force"):
@@ -247,7 +247,7 @@ def _moving_levels(effects: Sequence[Effect], speed: str) -> str:
 
 
 def _bristle(effects: Sequence[Effect], hung: bool) -> str:
-    """Half a step of bending, the force there for the whole step, the other half: each at the mean speed of its half.
+    """Half a step of bristle deflection, the force for the full step, the other half step; each uses the mean speed of its half.
 
     hung: with resonances in the loop
     """
@@ -272,7 +272,7 @@ def _bristle(effects: Sequence[Effect], hung: bool) -> str:
 
 
 def _hang(effects: Sequence[Effect]) -> str:
-    """The resonances as polynomials, 1 at 0 Hz; one without roots in s is left to act on the sampled motion."""
+    """The resonances as polynomials, 1 at 0 Hz; one without roots in s filters the sampled motion instead."""
     lines = []
     for effect in _of(effects, "motion"):
         lines += [
@@ -305,7 +305,7 @@ def _motions(effects: Sequence[Effect]) -> str:
 
 
 def _motions_taken_back(effects: Sequence[Effect]) -> str:
-    """The same sections solved for what goes in: their zeros are damped, so that nothing grows."""
+    """The inverse of the same sections: their zeros are damped, so that the result does not grow."""
     lines = []
     for effect in _of(effects, "motion"):
         lines += [
@@ -326,7 +326,7 @@ def _motions_taken_back(effects: Sequence[Effect]) -> str:
 
 
 def _places(effects: Sequence[Effect]) -> str:
-    """Where the axis is, by iteration: x = shown - (error(x) - error(0)), so that both are 0 at the same place."""
+    """The axis position by iteration: x = shown - (error(x) - error(0)), so that both are 0 at the same position."""
     lines = ["shown, encoded, offset = x, False, 0.0"]
     for effect in _of(effects, "encoder"):
         lines += [f"if has_{effect.name}:", "    encoded = True", f"    offset += {_call(effect, 'error', {'x': '0.0'})}"]
@@ -347,7 +347,7 @@ def _encoders(effects: Sequence[Effect]) -> str:
 
 
 def _own_begins(effects: Sequence[Effect]) -> str:
-    """At the begin of a sample: its voltage, and the place at its end by the speed of the sample before."""
+    """Start of a sample: its voltage, and the position at its end predicted with the previous sample's speed."""
     lines = ["asked = u[i] + centring[i] * (x[0] - x[max(i - ago, 0)])", "sent[i] = held[i] = min(max(asked, -most), most)"]
     words = {"u": "held[i]", "t": "i / fs", "x": "x[i]"}
     for effect in _of(effects, "input"):
@@ -361,7 +361,7 @@ def _own_ends() -> str:
 
 
 def _own_encoders(effects: Sequence[Effect]) -> str:
-    """What the encoder shows of the motion: the place is known."""
+    """The encoder's reading from the motion; the position is known."""
     lines = []
     for effect in _of(effects, "encoder"):
         ends = [_call(effect, "error", {"x": place}) for place in ("x[i + 1]", "x[i]")]

@@ -1,10 +1,10 @@
-"""The frame of the loop, into which ``loop_source`` writes the laws of the effects.
+"""The frame of the loop, into which ``loop_source`` inserts the laws of the effects.
 
-Three ways through it: forces that are constant between switching instants, or straight lines of speed there, exactly; laws that
-bend with speed, in sub-steps; and an axis with resonances, with these inside (``resonant_loop``): exactly, and in sub-steps where
-laws heed the speed.
-In ``more``, ``begins`` and ``ends`` stands what an axis needs whose position is not measured but follows from its own motion.
-The second frame takes effects out of a recording, for those that only one-step prediction can judge.
+Three paths: forces that are constant or linear in speed between switching instants, exactly; laws that
+are nonlinear in speed, in sub-steps; and an axis with resonances (``resonant_loop``), exactly, and in sub-steps where
+laws depend on speed.
+``more``, ``begins`` and ``ends`` hold the code for an axis whose position is simulated, not measured.
+The second frame removes effects from a recording, for those that only one-step prediction can judge.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Mass or inertia, damping and friction in SI, where the input is a force, a torque, or a current with a known torque constant.
 
 The model tau v' + v = gain (u - friction) is inertia v' + damping v = torque - friction, with torque = factor u, damping = factor / gain and
-inertia = factor / (gain pole). A gear gives each number twice: as the joint or table sees it, and as the motor does.
+inertia = factor / (gain pole). With a gear each number is given twice: at the joint or table, and at the motor.
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ class Figure(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the parameter."""
+        """The name of the parameter."""
 
     @property
     def value(self) -> float:
-        """In ``unit``."""
+        """The value in ``unit``."""
 
     @property
     def low(self) -> float:
-        """Of the 95 % interval."""
+        """Lower end of the 95 % interval."""
 
     @property
     def high(self) -> float:
-        """Of the 95 % interval."""
+        """Upper end of the 95 % interval."""
 
     @property
     def unit(self) -> str:
-        """Of all three."""
+        """Unit of value and interval."""
 
 
 @dataclass(frozen=True, slots=True)
 class Transmission:
-    """kt: N m/A at the motor, None where the input is a torque or force; ratio: turns of the motor for one of the joint, or rad for a metre."""
+    """kt: N m/A at the motor, None if the input is a torque or force; ratio: turns of the motor per turn of the joint, or rad per metre."""
 
     kt: float | None = None
     ratio: float | None = None
@@ -55,7 +55,7 @@ class Transmission:
 
 @dataclass(frozen=True, slots=True)
 class Mechanical:
-    """One number in SI: at the joint or table, at the motor (None without a gear), and its name in MuJoCo and URDF (empty if there is none)."""
+    """One number in SI: at the joint or table, at the motor (None without a gear), and its name in MuJoCo and URDF (empty without one)."""
 
     name: str
     value: float
@@ -68,7 +68,7 @@ class Mechanical:
 
 
 def drive_from(kt: float | None, gear: str, units: Units) -> Transmission:
-    """What --kt and --gear say; gear: turns of the motor for one of the output (50), or the way of one turn with its unit (5mm). Raises BadInput."""
+    """The transmission from --kt and --gear; gear: motor turns per output turn (50), or travel per motor turn with unit (5mm). Raises BadInput."""
     if kt is not None and units.input != "A":
         raise BadInput("--kt", f"{kt:g} N m/A", f"an input in A, and this one is in {units.input}", "Say --unit input=A if it is a current.")
     if kt is not None and not 0.0 < kt < 1e6:
@@ -90,7 +90,7 @@ def drive_from(kt: float | None, gear: str, units: Units) -> Transmission:
 
 
 def mechanics(figures: Iterable[Figure], units: Units, drive: Transmission) -> tuple[Mechanical, ...]:
-    """What gain, pole (or time constant) and friction are in SI; empty where the input is no force, torque or current with a known constant.
+    """Gain, pole (or time constant) and friction in SI; empty unless the input is a force, a torque or a current with a known constant.
 
     figures: gain, pole or time_constant, and parameters in the unit of the input. Intervals take gain and pole as independent, which makes
     those of the inertia too wide rather than too narrow.
@@ -117,7 +117,7 @@ def mechanics(figures: Iterable[Figure], units: Units, drive: Transmission) -> t
 
 
 def _factor(units: Units, drive: Transmission) -> float | None:
-    """Force or torque at the output for one unit of the input."""
+    """Force or torque at the output per unit of the input; None if unknown."""
     ratio = drive.ratio or 1.0
     if units.input == "A":
         return None if drive.kt is None or (units.output == "m" and drive.ratio is None) else drive.kt * ratio
@@ -127,7 +127,7 @@ def _factor(units: Units, drive: Transmission) -> float | None:
 
 
 def _spread(item: Figure) -> float:
-    """Half the interval's width over the value, of its logarithm."""
+    """Half width of the interval relative to the value, on a log scale."""
     ends = [abs(end) for end in (item.low, item.high)]
     if item.low * item.high <= 0.0 or not all(map(math.isfinite, ends)):
         return math.inf

@@ -1,11 +1,11 @@
 """One axis in the time domain: a rigid base (gain, delay, pole) and any of a library's effects.
 
-The velocity is simulated from the speed with which the measured position begins. What depends on position uses the
-measured one, so that nothing drifts. Scheme:
-each sample is split where the delayed voltage changes; between, the viscous pole is integrated exactly for a constant
-force, and dry friction finds its zero crossings in time (Karnopp 1985's problem without his dead band). Laws that bend
-with speed get sub-steps (two in each piece at 2 kHz), by the midpoint rule. Resonances filter the sampled motion, unless
-a law heeds the speed: then they are in the loop with it (``resonant_loop``), with the same parameters and the same linear limit.
+The velocity is simulated from the initial speed of the measured position. Laws that depend on position use the
+measured one, so that there is no drift. Scheme:
+each sample is split where the delayed voltage changes. In between, the viscous pole is integrated exactly for a constant
+force, and the zero crossings of dry friction are found in time (Karnopp 1985's problem without his dead band). Laws that are
+nonlinear in speed get sub-steps (two in each piece at 2 kHz), by the midpoint rule. Resonances filter the sampled motion, unless
+a law depends on speed: then they are in the loop with it (``resonant_loop``), with the same parameters and the same linear limit.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import unknown_name
 
 FINE = 16000.0  # Hz: sub-steps; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
-FADED = 3.0  # time constants after which a wrong start is no longer seen (5 %)
-SURE = 3.0  # times its standard deviation that a start must be off to be known to be
-ROUNDS = 4  # of putting it right: friction bends what is linear in a rigid axis
+FADED = 3.0  # time constants after which a wrong start speed has decayed (5 %)
+SURE = 3.0  # times its standard deviation: a larger error of the start speed is corrected
+ROUNDS = 4  # correction rounds: friction makes nonlinear what is linear in a rigid axis
 
 
 class Library:
-    """A set of effects that simulate in one compiled loop, which is made at its first use."""
+    """A set of effects that simulate in one compiled loop, which is built at its first use."""
 
     def __init__(self, effects: Iterable[Effect]) -> None:
         self.effects: dict[str, Effect] = {effect.name: effect for effect in effects}
@@ -56,24 +56,24 @@ class Library:
 
     @property
     def undoing(self) -> Undoing:
-        """The compiled loop that takes effects out of a recording; see ``loop_source.undoing``."""
+        """The compiled loop that removes effects from a recording; see ``loop_source.undoing``."""
         if self._undoing is None:
             self._undoing = build_undoing(self.acting)
         return self._undoing
 
     @property
     def moving(self) -> Moving:
-        """The compiled loop of an axis whose position follows from its own motion; see ``loop_source.moving``."""
+        """The compiled loop of an axis whose position follows from its simulated motion; see ``loop_source.moving``."""
         if self._moving is None:
             self._moving = build_moving(self.acting)
         return self._moving
 
     def looped(self, active: Iterable[Effect]) -> Library:
-        """Whose loop these effects run in: the built-in library's, which the disk has, unless one of them is of another make."""
+        """The library in whose loop these effects run: the built-in one, which is cached on disk, unless one of them differs from it."""
         return STANDARD if all(STANDARD.effects.get(effect.name) is effect for effect in active) else self
 
     def extended(self, effects: Iterable[Effect]) -> Library:
-        """A library with more effects; raises BadInput for a name that is taken."""
+        """A library with more effects; raises BadInput for a name that is in use."""
         added = list(effects)
         for effect in added:
             if effect.name in self.effects:
@@ -89,7 +89,7 @@ class AxisModel:
     """A hypothesis about an axis.
 
     gain: m/s/V; delay: s; pole: rad/s; effects: (name, parameter values in the effect's order), SI
-    per_recording: (``effect.parameter``, its value in each recording of a fit) of what differs between them; in ``effects`` is the mean
+    per_recording: (``effect.parameter``, its value in each recording of a fit) for parameters that differ; ``effects`` holds the mean
     """
 
     gain: float
@@ -125,12 +125,12 @@ class AxisModel:
         return self._of(tuple(item for item in self.effects if item[0] != name))
 
     def _of(self, effects: tuple[tuple[str, tuple[float, ...]], ...]) -> AxisModel:
-        """The same base with other effects; those that are as they were keep their values in each recording."""
+        """The same base with other effects; unchanged effects keep their values per recording."""
         same = {name for name, _ in set(effects) & set(self.effects)}
         return replace(self, effects=effects, per_recording=tuple(item for item in self.per_recording if item[0].partition(".")[0] in same))
 
     def in_recording(self, number: int) -> AxisModel:
-        """The model as it is in one of the recordings of its fit, counted from 0."""
+        """The model for one of the recordings of its fit, counted from 0."""
         own = {name: values[number] for name, values in self.per_recording}
         if not own:
             return self
@@ -139,11 +139,11 @@ class AxisModel:
         return replace(self, effects=effects, per_recording=())
 
     def _turned(self, name: str, values: tuple[float, ...]) -> tuple[float, ...]:
-        """A size in the sense of the motion, where friction acts, as one in the sense of the drive, where a force does; and the way back."""
+        """Convert a size signed by the motion (friction) to one signed by the drive (force), or back."""
         return (-values[0], *values[1:]) if self.gain < 0.0 and self.library[name].category == "force" else values
 
     def joined(self) -> AxisModel:
-        """The same model with one effect for several where they are its very law."""
+        """The same model with several effects merged into one where their laws are equal."""
         own = dict(self.effects)
         for effect in self.library.acting:
             if effect.sum_of is not None and all(part in own for part in effect.sum_of.parts):
@@ -154,7 +154,7 @@ class AxisModel:
         return self
 
     def apart(self, name: str) -> AxisModel:
-        """The same model with the parts of an effect in its place, if it is the sum of several."""
+        """The same model with an effect replaced by its parts, if it is the sum of several."""
         whole, own = self.library[name].sum_of, dict(self.effects)
         if whole is None:
             return self
@@ -163,17 +163,17 @@ class AxisModel:
 
     @property
     def row(self) -> FloatArray:
-        """Its parameters as ``simulator`` takes them."""
+        """The parameters in the order that ``simulator`` expects."""
         return np.array([self.gain, self.delay, self.pole, *(value for _, values in self.effects for value in values)])
 
     def values(self) -> dict[str, float]:
-        """Every parameter by ``gain``, ``delay``, ``pole``, ``effect.parameter``."""
+        """Every parameter by name: ``gain``, ``delay``, ``pole``, ``effect.parameter``."""
         own = {f"{name}.{key}": value for name, row in self.effects for key, value in zip(self.library[name].names, row, strict=True)}
         return {"gain": self.gain, "delay": self.delay, "pole": self.pole, **own}
 
 
 class Simulation(Protocol):
-    """See ``simulator``."""
+    """The function that ``simulator`` returns."""
 
     def __call__(self, parameters: FloatArray, start: float = 0.0) -> FloatArray: ...
 
@@ -181,11 +181,11 @@ class Simulation(Protocol):
 def simulator(
     library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray, fine: float = FINE
 ) -> Simulation:
-    """A function from parameters to the simulated velocity (n - 1,), m/s, for many runs on the same data, several at once too.
+    """A function from parameters to the simulated velocity (n - 1,), m/s, for many simulations of the same data; it may run in parallel.
 
     Its arguments are a row: gain, delay, pole, then each active effect's parameters, in the order of ``active``; and the speed at the
-    first sample, m/s, which is none if it is not given (see ``start_of``). Without a gain, by which laws divide, the motion is no number.
-    voltage, position: (n,) V and m; the voltage of sample k is held to k + 1; fine: Hz, sub-steps for what heeds speed
+    first sample, m/s, 0 by default (see ``start_of``). With gain 0, by which laws divide, the result is NaN.
+    voltage, position: (n,) V and m; the voltage of sample k is held to k + 1; fine: Hz, sub-steps for laws that depend on speed
     """
     if voltage.shape != position.shape or voltage.ndim != 1 or voltage.size < 2:
         raise BadInput("shape of voltage and position", f"{voltage.shape} and {position.shape}", "one and the same (n,), n >= 2", "Give one axis.")
@@ -217,11 +217,11 @@ def simulator(
 def undoer(
     library: Library, active: Iterable[str], sampling_rate: float, voltage: FloatArray, position: FloatArray
 ) -> Callable[[FloatArray, int], tuple[FloatArray, FloatArray, FloatArray, float]]:
-    """A function that takes effects (of ``undoable``) out of the first samples of a recording, for several threads at once.
+    """A function that removes effects (of ``undoable``) from the first samples of a recording; it may run in several threads.
 
-    Its arguments are a row as of ``simulator``, and n; it returns the voltage behind the amplifier (n,), V, the position before
-    resonances and the scale's errors (n + 1,), m, the forces against the drive (2, n), at the motor and on the table, V, and how
-    much of a sudden change of that position the encoder shows at once.
+    Its arguments are a row as in ``simulator``, and n. It returns the voltage behind the amplifier (n,), V; the position before
+    resonances and the scale's errors (n + 1,), m; the forces against the drive (2, n), at the motor and at the table, V; and the
+    fraction of a sudden change of that position that the encoder shows at once.
     """
     chosen = [library[name] for name in active]
     library = library.looped(chosen)
@@ -244,15 +244,15 @@ def undoer(
 
 
 def simulate(model: AxisModel, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
-    """(n - 1,) mean velocity of each sample, m/s, from the speed at the first; arguments as in ``simulator``."""
+    """(n - 1,) mean velocity of each sample, m/s, starting with the speed at the first; arguments as in ``simulator``."""
     names, start = [name for name, _ in model.effects], start_of(model, sampling_rate, voltage, position)
     return simulator(model.library, names, sampling_rate, voltage, position)(model.row, start)
 
 
 def start_of(model: AxisModel, sampling_rate: float, voltage: FloatArray, position: FloatArray, fine: float = FINE) -> float:
-    """The speed at the first sample, m/s, with which a model explains best how a recording begins; arguments as in ``simulator``.
+    """The speed at the first sample, m/s, with which a model best explains the start of a recording; arguments as in ``simulator``.
 
-    What is wrong with it fades with the pole. It is put right as long as that stands out of the error that follows (Gauss's method, one unknown).
+    The effect of a wrong value decays with the pole. It is corrected while it is significant in the error that follows (Gauss's method, one unknown).
     """
     seen, doubt = start_speed(sampling_rate, position)
     start, low, high = (seen if abs(seen) > SURE * doubt else 0.0), seen - SURE * doubt, seen + SURE * doubt
@@ -263,7 +263,7 @@ def start_of(model: AxisModel, sampling_rate: float, voltage: FloatArray, positi
     velocity, fading = sample_velocity(sampling_rate, position[: count + 1]), np.exp(-model.pole * (np.arange(fades) + 0.5) / sampling_rate)
     run = simulator(model.library, [name for name, _ in model.effects], sampling_rate, voltage[: count + 1], position[: count + 1], fine)
     for _ in range(ROUNDS):
-        with np.errstate(all="ignore"):  # a model may run away
+        with np.errstate(all="ignore"):  # a model may diverge
             error = velocity - run(model.row, start)
             off = float(error[:fades] @ fading / (fading @ fading))
             known = SURE * float(np.std(error[fades:])) < abs(off) < np.inf
@@ -274,5 +274,5 @@ def start_of(model: AxisModel, sampling_rate: float, voltage: FloatArray, positi
 
 
 def sample_velocity(sampling_rate: float, position: FloatArray) -> FloatArray:
-    """(n - 1,) mean velocity of each sample, m/s: what ``simulate`` predicts."""
+    """(n - 1,) mean velocity of each sample, m/s: the quantity that ``simulate`` predicts."""
     return np.asarray(np.diff(position) * sampling_rate)

@@ -1,21 +1,21 @@
-"""Resonances inside the loop: where friction acts on the motion that the encoder sees, not on the rigid one.
+"""Resonances inside the loop: friction acts on the motion that the encoder sees, not on the rigid one.
 
 Base and resonances together are one linear system from the force (in volts) to the speed v at the encoder,
 
     v = gain pole / (s + pole) prod_i H_i(s) (u - friction),   H_i = Z_i(s) / P_i(s),
 
-whose order is 1 + m, m = 2 for each resonance. It is split where friction can hold it, with sigma = s / rate and
+whose order is 1 + m, with m = 2 per resonance. It is split at the point where friction acts, with sigma = s / rate and
 Z = prod Z_i = sigma^m + sum z_j sigma^j:
 
     v'   = rate (strength (u - friction) - drag v - sum c_j q_j)
     q_j' = rate q_(j+1),   q_(m-1)' = rate (v - sum z_j q_j)
 
-so that drag and c are what is left of (sigma + pole / rate) prod P_i after division by Z. The q are the masses that hang
-on the encoder's side: base on its feet (Preumont, Vibration Control of Active Structures, 3rd ed., sec. 2.4) or table on
+so that drag and c are the remainder of (sigma + pole / rate) prod P_i after division by Z. The q are the masses attached
+to the encoder's side: base on its feet (Preumont, Vibration Control of Active Structures, 3rd ed., sec. 2.4) or table on
 the screw; with v held at zero they swing freely, at the zeros. Between changes of the force all of this is exact
 (matrix exponential; Moler & Van Loan, SIAM Review 45 (2003), method 3).
 
-A state is a row (x, v, q_0 .. q_(m-1), force), (m + 3,); its generator carries the force along as a constant.
+A state is a row (x, v, q_0 .. q_(m-1), force), (m + 3,); its generator holds the force constant.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ import numpy as np
 from xy_sysid.jit import compiled, inlined
 from xy_sysid.samples.block import FloatArray
 
-FINE = 1e5  # Hz at which a section is asked for its roots: far above any resonance, so that none is folded back
-TERMS = 10  # of power series within a sub-step; as STIFF is 0.5, the first that is left out is below 1e-10
+FINE = 1e5  # Hz at which the roots of a section are computed: far above any resonance, so that there is no aliasing
+TERMS = 10  # terms of a power series within a sub-step; as STIFF is 0.5, the first omitted term is below 1e-10
 STIFF = 0.5  # longest sub-step times the fastest rate
-ONE_MODE = 5  # numbers of a state with one resonance, the usual case, whose sums are written out
-CUTS = 0.004  # s: most sub-steps of a sample over the rate asked for, Hz, however stiff a trial is: a first round must not last minutes
+ONE_MODE = 5  # length of a state with one resonance, the usual case, whose sums are unrolled
+CUTS = 0.004  # s: limit of sub-steps per sample over the requested rate, Hz, for any stiffness: a first call must not take minutes
 
 
 @compiled
@@ -90,7 +90,7 @@ def resting(moving: FloatArray) -> FloatArray:
 
 @compiled
 def fastest(pole: float, bottom: FloatArray, rate: float) -> float:
-    """Upper bound of the rates of the whole system, rad/s, within a factor of 2 (Fujiwara 1916)."""
+    """Upper bound of the rates of the full system, rad/s, within a factor of 2 (Fujiwara 1916)."""
     found = pole / rate
     m = bottom.size - 1
     for k in range(1, m + 1):
@@ -112,7 +112,7 @@ def product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 @compiled
 def exponential(a: FloatArray, h: float) -> FloatArray:
-    """exp(a h) by scaling and squaring. In loops: expressions of arrays take ten times as long to compile."""
+    """exp(a h) by scaling and squaring. Written with loops: array expressions take ten times as long to compile."""
     n, norm = a.shape[0], 0.0
     for i in range(n):
         total = 0.0
@@ -139,7 +139,7 @@ def exponential(a: FloatArray, h: float) -> FloatArray:
 
 @compiled
 def exponentials(a: FloatArray, first: float, second: float) -> FloatArray:
-    """(2, n, n) exp(a h) for two steps h. The assignment of a whole matrix would compile numba's words for one of another shape, 3 s long."""
+    """(2, n, n) exp(a h) for two steps h. Assigning a full matrix would make numba compile its error text for another shape, which takes 3 s."""
     n = a.shape[0]
     made = np.empty((2, n, n))
     for piece in range(2):
@@ -165,7 +165,7 @@ def ahead(by: FloatArray, piece: int, state: FloatArray, force: float) -> float:
 
 @inlined
 def step(by: FloatArray, piece: int, state: FloatArray, force: float, spare: FloatArray) -> float:
-    """Moves the state on by a sub-step; returns the distance, m."""
+    """Advance the state by a sub-step; returns the distance, m."""
     n = state.size
     if n == ONE_MODE:
         v, a, b = state[1], state[2], state[3]
@@ -188,7 +188,7 @@ def step(by: FloatArray, piece: int, state: FloatArray, force: float, spare: Flo
 
 @inlined
 def tug(moving: FloatArray, state: FloatArray) -> float:
-    """What the hanging masses add to the force at this instant, V."""
+    """Force of the attached masses at this instant, V."""
     n = state.size
     total: float = 0.0
     for j in range(2, n - 1):
@@ -198,7 +198,7 @@ def tug(moving: FloatArray, state: FloatArray) -> float:
 
 @compiled
 def unfold(a: FloatArray, state: FloatArray, force: float, series: FloatArray) -> None:
-    """series (TERMS, m + 3): the state as powers of time, from now on."""
+    """Write to series (TERMS, m + 3) the state as a power series in time from now on."""
     n = state.size
     for i in range(n):
         series[0, i] = state[i]
@@ -225,7 +225,7 @@ def follow(series: FloatArray, t: float, state: FloatArray) -> float:
 
 @compiled
 def crossing(powers: FloatArray, h: float) -> float:
-    """Where a polynomial (TERMS,), lowest power first, changes its sign between 0 and ``h``: Newton's way, held by halving."""
+    """Zero crossing of a polynomial (TERMS,), lowest power first, between 0 and ``h``: Newton's method, safeguarded by bisection."""
     low, high, rising = 0.0, h, powers[0] < 0.0
     slope = powers[1]
     t = -powers[0] / slope if slope != 0.0 else 0.5 * h
@@ -251,7 +251,7 @@ def crossing(powers: FloatArray, h: float) -> float:
 def stop(
     moving: FloatArray, still: FloatArray, state: FloatArray, push: float, force: float, forth: float, back: float, h: float, series: FloatArray
 ) -> float:
-    """A sub-step within which v comes to zero: then it sticks, or turns; returns the distance, m.
+    """A sub-step within which v reaches zero: then it sticks or reverses; returns the distance, m.
 
     push: without friction, V; force: with that of the motion until now, V; forth, back: levels at rest, V, along the voltage
     """
@@ -286,7 +286,7 @@ def hold(
     series: FloatArray,
     spare: FloatArray,
 ) -> float:
-    """A sub-step that begins at rest: the hanging masses may tear it loose; returns the distance, m. Arguments as of ``stop``."""
+    """A sub-step that starts at rest: the attached masses may cause breakaway; returns the distance, m. Arguments as in ``stop``."""
     n = state.size
     after = push
     for j in range(2, n - 1):

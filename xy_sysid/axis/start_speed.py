@@ -1,4 +1,4 @@
-"""How fast an axis moves where its recording begins: a recording that is cut out of a longer one does not begin at rest."""
+"""The speed of an axis at the start of its recording: a recording cut from a longer one does not start at rest."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 
 from xy_sysid.samples.block import FloatArray
 
-SHORTEST = 8  # samples from which a parabola and what it leaves are known
-LONGEST = 0.2  # s of the beginning that may tell
+SHORTEST = 8  # least samples for a parabola and its residual
+LONGEST = 0.2  # s of the start that are used at most
 
 
 def start_speed(sampling_rate: float, position: FloatArray) -> tuple[float, float]:
     """Speed at the first sample of a position (n,), and its standard deviation, m/s.
 
-    The slope at the beginning of a parabola (Savitzky & Golay, Analytical Chemistry 36, 1964) through 8 samples, or 16, 32 ... as long as
-    noise leaves more doubt than that the motion is no parabola: a cubic's slope differs by so much.
+    The initial slope of a parabola (Savitzky & Golay, Analytical Chemistry 36, 1964) through 8, 16, 32 ... samples, as long as the uncertainty by
+    noise is larger than that by the parabola's shape, which is the difference to a cubic's slope.
     """
     found, doubt, count = 0.0, np.inf, SHORTEST
     while count <= min(position.size, max(LONGEST * sampling_rate, SHORTEST)):
@@ -35,7 +35,7 @@ def start_speed(sampling_rate: float, position: FloatArray) -> tuple[float, floa
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """What gives a polynomial's slope at the first sample, per sample, (n,), and its values (n, n)."""
+    """Weights for a polynomial's slope at the first sample, per sample, (n,), and for its values (n, n)."""
 
     slope: FloatArray
     values: FloatArray

@@ -21,7 +21,7 @@ from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.settings import IdentifierSettings, build
 from xy_sysid.units import told
 
-HELD_OUT = 1.0 / 3.0  # of the recording, when a model was fitted to it
+HELD_OUT = 1.0 / 3.0  # of the recording, if the model was fitted to it
 SEEN = "the model was fitted to this recording; only its last third is used"
 
 MOST_LEFT = 0.7  # of the motion: half of its power
@@ -30,9 +30,9 @@ HARDLY = "The model explains little of the motion: it does not describe this axi
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """A model on the data of one axis.
+    """A model compared with the data of one axis.
 
-    where:      in time, by speed, place and so on; check: in frequency, None where the data are too short or nothing is coherent
+    where:      in time, by speed, position and so on; check: in frequency, None if the data are too short or nothing is coherent
     notes:      caveats for the user
     """
 
@@ -76,7 +76,7 @@ def better(data: Run | Recording, before: AnyModel, after: AnyModel) -> Paired:
 
 
 def judge(recording: Recording, axis: str, model: AnyModel | None, settings: IdentifierSettings) -> Judgement:
-    """On the whole recording for a model of another one; else on its last third, with a model fitted to the rest if there is none."""
+    """Compare on the full recording if the model is from another one, else on its last third; without a model, fit one to the rest."""
     seen = model is not None and recording.run(axis).digest in model.data
     data = recording
     if model is None:
@@ -88,13 +88,13 @@ def judge(recording: Recording, axis: str, model: AnyModel | None, settings: Ide
     with np.errstate(over="ignore"):  # positions of any size
         encoder = encoder_noise(run.sampling_rate, recording.run(axis).position, run.measured, recording.run(axis).voltage)
     unseen = Unseen(run.voltage[first:], run.position[first:], run.sampling_rate, run.units, encoder=encoder)
-    with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
+    with np.errstate(over="ignore", invalid="ignore"):  # a model that diverges
         where = compare_motion(velocity, unseen)
     hardly = HARDLY if np.isfinite(where.error) and where.error > MOST_LEFT * where.motion else ""
     notes = tuple(text for text in (model.doubt, SEEN if seen else "", hardly) if text)
     try:
         return Judgement(where, in_frequency(data, axis, model, settings)[0], notes)
-    except BadInput:  # too short for a window, or nothing coherent: time alone must do
+    except BadInput:  # too short for a window, or nothing coherent: use the time domain only
         return Judgement(where, None, notes)
 
 
@@ -114,7 +114,7 @@ def in_frequency(
 
 
 def simulated(recording: Recording, axis: str, model: AnyModel) -> Recording:
-    """The recording as the model says that this axis would have moved in it, run by run."""
+    """The recording with the simulated motion of the model on this axis, run by run."""
     u, y = recording.axis(axis)
     position = recording.position.copy()
     column = recording.axes.index(axis)
@@ -126,7 +126,7 @@ def simulated(recording: Recording, axis: str, model: AnyModel) -> Recording:
 
 
 def frequency_sentence(line: ModelCheck, where: Comparison) -> str:
-    """The check in words, and its limits."""
+    """The comparison in words, and its limits."""
     text = f"in frequency: residual {told(line.rms_sigma)} sigma rms, at worst {told(line.worst_sigma)} at {line.worst_hz:.4g} Hz"
     hidden = line.rms_sigma <= AT_THE_FLOOR and where.error_below_end > TWICE * where.floor_below_end
     return text + (
@@ -135,7 +135,7 @@ def frequency_sentence(line: ModelCheck, where: Comparison) -> str:
 
 
 def held(run: Run) -> int:
-    """The first sample of the last third, which judges a model that was fitted to the run."""
+    """Index of the first sample of the last third, which is held out if the model was fitted to the run."""
     return int((1.0 - HELD_OUT) * len(run))
 
 

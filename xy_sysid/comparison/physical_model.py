@@ -1,4 +1,4 @@
-"""A model of an axis with physical effects, which can be compared, drawn and saved like a linear model."""
+"""A model of an axis with physical effects. It can be compared, drawn and saved like a linear model."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from xy_sysid.units import USUAL, Units, moved
 class PhysicalModel:
     """A rigid axis with physical effects, with its fit and origin.
 
-    model: gain, delay, pole and the effects with their values; fit: with intervals and errors, None of a model from a file
-    axis:  its name; data: SHA-256 of the samples of each recording that it was fitted to; units: of input and output
+    model: gain, delay, pole and the effects with their values; fit: with intervals and errors, None for a model from a file
+    axis:  its name; data: SHA-256 of the samples of each recording in the fit; units: of input and output
     known: its parameters with intervals, of a model from a file
     sampling_rate: Hz, of the recording that it was fitted to; None if unknown
     """
@@ -34,12 +34,12 @@ class PhysicalModel:
 
     @property
     def tf(self) -> TransferFunction:
-        """The linear part: base, delay, resonances and lags, without friction and the like."""
+        """The linear part: base, delay, resonances and lags, without friction and other nonlinear effects."""
         return linear_part(self.model, self.units)
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Their names."""
+        """The names of the effects."""
         return tuple(name for name, _ in self.model.effects)
 
     @property
@@ -49,7 +49,7 @@ class PhysicalModel:
 
     @property
     def doubt(self) -> str:
-        """Why the model cannot be judged by its free simulation; empty if it can."""
+        """Why free simulation cannot judge the model; empty if it can."""
         names = [name for name in self.effects if not self.model.library[name].simulable]
         if not names:
             return ""
@@ -57,7 +57,7 @@ class PhysicalModel:
 
     @property
     def label(self) -> str:
-        """A few words for a legend."""
+        """A short text for a legend."""
         return f"rigid with {' and '.join(self.effects).replace('_', ' ')}" if self.effects else "rigid"
 
     @property
@@ -69,11 +69,11 @@ class PhysicalModel:
         return parameter_table(self.parameters)
 
     def __str__(self) -> str:
-        """Its effects, the formula of its linear part, and the table of the parameters."""
+        """Effects, formula of the linear part, and table of the parameters."""
         return "\n\n".join((repr(self)[1:-1], f"linear part:\n{self.tf}", str(self.table)))
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
-        """(n - 1,) simulated mean velocity of each sample, m/s, from the speed with which the position begins."""
+        """(n - 1,) simulated mean velocity of each sample, m/s, starting with the initial speed of the position."""
         return simulate(self.model, sampling_rate, voltage, position)
 
     def __repr__(self) -> str:

@@ -1,8 +1,8 @@
 """Is the residual error noise? Its autocorrelation, and its cross-correlation with the input.
 
 Ljung, System Identification, 2nd ed., sec. 16.6: the residual of a complete model does not correlate with past inputs.
-The bounds are those of a residual and an input that are unrelated, each with its own spectrum (Bartlett, J. R. Stat.
-Soc. Suppl. 8, 1946), so that an encoder's noise, which alternates from sample to sample, does not count as a fault of the model.
+The bounds are those of an unrelated residual and input, each with its own spectrum (Bartlett, J. R. Stat.
+Soc. Suppl. 8, 1946). Therefore an encoder's noise, which alternates from sample to sample, does not count as a model fault.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
 LAGS = 100  # samples to each side
-COLOUR = 20  # part of the record up to which lags count for the bounds
+COLOUR = 20  # fraction of the record up to which lags count for the bounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class ResidualCorrelation:
     """Correlations of a residual.
 
     lag:    (m,) samples, from 0; autocorrelation: (m,), 1 at lag 0; white: bound of 95 % of it for a white residual
-    shift:  (2 m - 1,) samples by which the residual comes after the input (below 0: before it, which only feedback can cause)
+    shift:  (2 m - 1,) samples of the residual's delay relative to the input (negative: only feedback can cause it)
     cross:  (2 m - 1,) correlation of input and residual, -1..1; unrelated: bound of 95 % of it for unrelated signals
     """
 
@@ -38,14 +38,14 @@ class ResidualCorrelation:
 
     @property
     def outside(self) -> float:
-        """Part of the shifts from 0 on at which the residual correlates with the input: 0.05 by chance."""
+        """Fraction of the shifts from 0 on at which the residual correlates with the input: 0.05 by chance."""
         return float(np.mean(np.abs(self.cross[self.shift >= 0]) > self.unrelated))
 
 
 def residual_correlation(residual: FloatArray, voltage: FloatArray, lags: int = LAGS) -> ResidualCorrelation:
     """Correlations of a residual (n,) with itself and with the input (n,), to ``lags`` samples.
 
-    Raises BadInput if the lengths differ, there are fewer than twenty samples for each lag, or one of them does not move.
+    Raises BadInput if the lengths differ, there are fewer than twenty samples per lag, or one of them is constant.
     """
     if residual.size != voltage.size:
         raise BadInput("residual", f"{residual.size} samples", f"{voltage.size}, as many as of the input", "Give both for the same samples.")

@@ -3,8 +3,8 @@
 By frequency, speed, direction of motion, position (once or repeating), amplitude of the input, and time: each place with its
 error in multiples of the noise floor.
 
-The noise floor is the smallest error that the data can show: the encoder's noise, together with the part of the motion to which
-laws are trusted (EPSILON). It is the floor by which a fit is judged. The error over the floor is one number for the whole recording; the
+The noise floor is the smallest error that the data can show: the encoder's noise, plus the fraction of the motion to which
+laws are trusted (EPSILON). Fits are judged by the same floor. The error over the floor is one number for the full recording; the
 error in bins of speed, position, amplitude and time is scaled so that its mean power is the square of that number.
 """
 
@@ -27,15 +27,15 @@ from xy_sysid.units import USUAL, Units, motion, moved, told
 
 PlaceKind = Literal["frequency", "speed", "direction", "position", "amplitude", "time"]
 
-SKIP = 0.5  # s at the start, in which the simulation forgets that it started from rest; a fifth of a short run
+SKIP = 0.5  # s at the start until initial conditions of the simulation have decayed; a fifth of a short run
 SHORTEST_RUN = 600  # samples
-WINDOWS = 7  # window lengths that the samples hold at least
-TWICE = 2.0  # times the floor from which a place is reported
-STANDS_OUT = 1.3  # times the whole error that a bin must reach to be a place of its own
+WINDOWS = 7  # least number of window lengths in the samples
+TWICE = 2.0  # multiple of the floor from which a place is reported
+STANDS_OUT = 1.3  # multiple of the overall error from which a bin is a place of its own
 SPEED_BINS, POSITION_BINS, AMPLITUDE_BINS, TIME_BINS = 10, 24, 6, 10
-UNEVEN = 0.3  # of the whole error that the two directions must differ by
+UNEVEN = 0.3  # of the overall error: least difference between the two directions
 FEWEST = 200  # samples in a bin
-PERIODS = 200  # spatial periods tried, from SHORTEST to a third of the travel
+PERIODS = 200  # spatial periods tested, from SHORTEST to a third of the travel
 SHORTEST = 2e-4  # m
 ENVELOPE = 0.1  # s over which the amplitude of the input is taken
 
@@ -54,7 +54,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A model against unseen samples, in velocity, or in acceleration where that was measured.
+    """A model compared with held-out samples, in velocity, or in acceleration if that was measured.
 
     time: (n,) s; measured, predicted: (n,) in ``unit``; position: (n,) m
     motion, error, noise_floor: rms, m/s, up to the top band
@@ -93,12 +93,12 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """Samples of a gap-free run that no fit saw, or of several, one after the other.
+    """Held-out samples of one or several consecutive gap-free runs.
 
-    voltage, position: (n,) input and output; begins: time of the first, s
-    encoder: rms of the encoder's noise, in units.output, if more of the recording is known; None: from these samples
-    held: windows of the velocity that no fit saw, and the floor, where a fit has cut them; None: every sample counts
-    starts: sample at which each run begins; several need ``held``
+    voltage, position: (n,) input and output; begins: time of the first sample, s
+    encoder: rms of the encoder's noise, in units.output, if known from more of the recording; None: from these samples
+    held: held-out windows of the velocity, and the floor, as a fit has defined them; None: every sample counts
+    starts: index at which each run starts; several runs need ``held``
     """
 
     voltage: FloatArray
@@ -111,11 +111,11 @@ class Unseen:
     starts: tuple[int, ...] = (0,)
 
     def of_each(self, values: FloatArray, made: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """What is made of the samples (n,) of each run, one after the other."""
+        """Apply ``made`` to the samples (n,) of each run and join the results."""
         return np.concatenate([made(part) for part in np.split(values, self.starts[1:])])
 
     def windows(self, measured: FloatArray) -> tuple[Windows, Floor]:
-        """Windows that are judged, and the floor there. measured: (n,) velocity."""
+        """Windows that are compared, and their floor. measured: (n,) velocity."""
         if self.held is not None:
             return self.held
         encoder = encoder_noise(self.sampling_rate, self.position, self.units.sensed, self.voltage) if self.encoder is None else self.encoder
@@ -125,7 +125,7 @@ class Unseen:
 
     @property
     def skipped(self) -> int:
-        """Samples at the start that do not count."""
+        """Number of samples at the start that do not count."""
         return min(int(SKIP * self.sampling_rate), self.position.shape[0] // 5) if self.held is None else 0
 
 
@@ -152,7 +152,7 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     counts = windows.covered(error.size) if unseen.held is not None else slice(None)
     layout = windows.layout
     accelerated = unseen.units.sensed == "acceleration"
-    offset = 0.0 if accelerated else float(np.mean(error[counts]))  # a constant velocity leaves no trace in an acceleration
+    offset = 0.0 if accelerated else float(np.mean(error[counts]))  # a constant velocity is invisible in an acceleration
     power = layout.power(windows.spectrum(error - offset))
     edges = layout.edges()
     centres = np.append(0.5 * edges[1], np.sqrt(edges[2:] * edges[1:-1]))
@@ -168,7 +168,7 @@ def compare_motion(model: FloatArray, unseen: Unseen) -> Comparison:
     low_error = _low_pass(error, end, sampling_rate)
     time = unseen.begins + (np.arange(error.shape[0]) + first) / sampling_rate
     total = float(np.sqrt(np.mean(low_error[counts] ** 2)))
-    noise = total * allowed / max(whole, 1e-300)  # so that the bins have the ratio of the whole in their mean
+    noise = total * allowed / max(whole, 1e-300)  # the mean power over the bins then matches the overall ratio
     places = _frequency_places(edges, ratio, end, by_chance(layout.lines * windows.begins.size))
     if abs(offset) > TWICE * allowed:
         text = f"a constant error of {moved(offset, unit)}, {told(abs(offset) / allowed)} times the floor"
@@ -216,7 +216,7 @@ def _low_pass(values: FloatArray, end: float, sampling_rate: float) -> FloatArra
 
 
 def by_chance(averaged: FloatArray) -> FloatArray:
-    """(bands,) error over the floor that noise alone exceeds in one band of a thousand. averaged: (bands,) lines times windows.
+    """(bands,) error over floor that noise alone exceeds in one of a thousand bands. averaged: (bands,) lines times windows.
 
     The power of one line of one window is distributed as chi-square with two degrees of freedom.
     """
@@ -225,10 +225,10 @@ def by_chance(averaged: FloatArray) -> FloatArray:
 
 
 def _frequency_places(edges: FloatArray, ratio: FloatArray, end: float, chance: FloatArray) -> list[Place]:
-    """Runs of neighbouring bands that are above twice the floor, and above what chance gives: few lines and windows scatter widely."""
+    """Runs of neighbouring bands above twice the floor and above the chance level: a few lines and windows scatter widely."""
     places: list[Place] = []
     known = np.flatnonzero(np.isfinite(ratio))
-    filled = np.interp(np.arange(ratio.size), known, ratio[known]) if known.size else ratio  # the lowest bands may hold no line
+    filled = np.interp(np.arange(ratio.size), known, ratio[known]) if known.size else ratio  # the lowest bands may contain no line
     bad = (filled > np.maximum(TWICE, chance)) & (edges[1:] <= end * 1.05)
     start: int | None = None
     for k, flag in enumerate([*bad.tolist(), False]):
@@ -246,7 +246,7 @@ def _frequency_places(edges: FloatArray, ratio: FloatArray, end: float, chance: 
 
 
 def _binned(kind: PlaceKind, of: tuple[FloatArray, str], number: int, error: FloatArray, noise: float) -> list[Place]:
-    """The bin of equal counts whose error stands out most, joined with neighbours that do too. of: (n,) values, and their unit."""
+    """The bin (equal counts) with the largest error, joined with neighbours that also exceed the limit. of: (n,) values, and their unit."""
     (by, unit), total = of, float(np.sqrt(np.mean(error**2)))
     edges = np.unique(np.quantile(by, np.linspace(0.0, 1.0, number + 1)))
     if edges.size < 3:
@@ -286,7 +286,7 @@ def _direction(speed: FloatArray, error: FloatArray, noise: float, unit: str) ->
 
 
 def _periodic(position: FloatArray, error: FloatArray, noise: float, unit: str) -> list[Place]:
-    """A part of the error that repeats along the travel, at least three times."""
+    """A part of the error that is periodic in position, with at least three periods."""
     travel = float(np.ptp(position))
     if travel < 6 * SHORTEST:
         return []

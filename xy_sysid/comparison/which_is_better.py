@@ -1,7 +1,7 @@
-"""Is one model better than another? The errors of both on the same windows of the same unseen data, compared in pairs.
+"""Is one model better than another? A paired test of both errors on the same windows of the same held-out data.
 
 The excitation in a window affects both errors alike and cancels: a paired t-test (Student 1908) on
-ln(error after / error before), whole and by band of frequency (Holm 1979 for the many bands).
+ln(error after / error before), overall and by frequency band (Holm 1979 for the many bands).
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from xy_sysid.greybox.free_run import EPSILON
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units, bare, moved
 
-ABOVE = 1.2  # times the floor's power that one of the two errors must have for a change to matter
-SKIP = 0.5  # s at the start, in which a simulation forgets that it started from rest
-WANTED, FEWEST = 10, 5  # windows side by side
-LEVEL = 0.05  # chance of a false "better" or "worse"
+ABOVE = 1.2  # least power of one of the two errors, relative to the floor, for a change to matter
+SKIP = 0.5  # s at the start until initial conditions of the simulation have decayed
+WANTED, FEWEST = 10, 5  # adjacent windows: wanted number, least number
+LEVEL = 0.05  # probability of a false "better" or "worse"
 WORTH = 0.02  # relative change of the error that is negligible
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A range of frequency, Hz, and how the error changed there: after over before; better, worse, or neither (None)."""
+    """A range of frequency, Hz, and the change of the error in it: after over before; better, worse, or neither (None)."""
 
     low: float
     high: float
@@ -39,7 +39,7 @@ class Change:
 class Paired:
     """Two models on the same windows.
 
-    windows: side by side; before, after, noise_floor: rms error up to ``top`` Hz, in ``unit``
+    windows: adjacent; before, after, noise_floor: rms error up to ``top`` Hz, in ``unit``
     ratio, low, high: after over before, geometric mean over the windows, with its 95 % interval; t, p: of the paired test
     bands: every band; better: None if the test does not decide, or the change is negligible
     """
@@ -62,12 +62,12 @@ class Paired:
 
     @property
     def better(self) -> bool | None:
-        """After is better than before."""
+        """True if after is better than before, False if worse, None if undecided."""
         return self.ratio < 1.0 if self.p < LEVEL and abs(self.ratio - 1.0) > WORTH else None
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """Neighbouring bands that changed alike, joined; the largest change of each."""
+        """Neighbouring bands with the same change, joined; the largest change of each."""
         found: list[Change] = []
         for band in self.bands:
             last = found[-1] if found else None
@@ -102,7 +102,7 @@ def paired(before: FloatArray, after: FloatArray, position: FloatArray, sampling
     layout = bands(sampling_rate, measured.size // WANTED, sensed=units.sensed)
     every = Windows(layout, np.arange(0, max(measured.size - layout.length, 0) + 1, layout.length // 2))
     errors = [every.spectrum(measured - values[skip:]) for values in (before, after)]
-    power = [np.abs(error[::2]) ** 2 for error in errors]  # every other window: side by side
+    power = [np.abs(error[::2]) ** 2 for error in errors]  # every other window: no overlap
     windows = power[0].shape[0]
     if windows < FEWEST:
         needed = (FEWEST + 1) * layout.length / sampling_rate + SKIP
@@ -143,12 +143,12 @@ def paired(before: FloatArray, after: FloatArray, position: FloatArray, sampling
 
 
 def _log_ratio(before: FloatArray, after: FloatArray) -> FloatArray:
-    """(windows,) ln of the amplitudes' ratio."""
+    """(windows,) ln of the amplitude ratio."""
     return np.asarray(0.5 * np.log(np.maximum(after, 1e-300) / np.maximum(before, 1e-300)))
 
 
 def _test(values: FloatArray) -> tuple[float, float, float, float]:
-    """Mean, its standard error, t, and the chance of so large a |t| without any change."""
+    """Mean, its standard error, t, and the probability of such a |t| without a change."""
     mean, spread = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(values.size))
     if spread == 0.0:
         return mean, 0.0, 0.0 if mean == 0.0 else float(np.copysign(np.inf, mean)), 1.0 if mean == 0.0 else 0.0
@@ -157,7 +157,7 @@ def _test(values: FloatArray) -> tuple[float, float, float, float]:
 
 
 def _holm(chances: FloatArray) -> NDArray[np.bool_]:
-    """(n,) which of many tests say yes, with LEVEL for one false yes among them all."""
+    """(n,) which of many tests are significant, with probability LEVEL for any false one."""
     order = np.argsort(chances)
     passes = chances[order] <= LEVEL / (chances.size - np.arange(chances.size))
     many = int(np.argmin(passes)) if not bool(passes.all()) else chances.size

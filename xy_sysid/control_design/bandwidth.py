@@ -1,6 +1,6 @@
-"""The limits of the bandwidth: the cost of each part of the axis, and the gain by a filter in the loop.
+"""The limits of the bandwidth: the loss due to each part of the axis, and the gain by a filter in the loop.
 
-A part is left out and the loop is designed again: the crossover that it then reaches shows the cost of the part. A notch and a low-pass are
+A part is removed and the loop is designed again: the new crossover shows the loss due to that part. A notch and a low-pass are
 judged in the same way: a filter is used if the loop reaches a higher crossover with it, for every sample of the parameters.
 """
 
@@ -22,7 +22,7 @@ from xy_sysid.control_design.sampled import sampled
 from xy_sysid.control_design.uncertain import later
 from xy_sysid.errors import BadInput
 
-PASSED = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)  # of a resonance: where a low-pass is tried
+PASSED = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4)  # of a resonance's frequency: cut-offs to test for a low-pass
 UNCERTAIN, HOLD, CALCULATION = "uncertainty of the parameters", "sampling and hold", "calculation"
 
 
@@ -80,7 +80,7 @@ def bandwidth_of(model: PhysicalModel, sampling_rate: float, at: float, asked: A
 def with_filter(
     model: PhysicalModel, sampling_rate: float, modes: Sequence[Swing], without: Feedback, encoder: Encoder | None = None, limit: float = NO_LIMIT
 ) -> tuple[LoopFilter, Feedback] | None:
-    """The notch or low-pass with which the loop reaches the highest crossover, and that loop; None if none reaches more than ``without`` one."""
+    """The notch or low-pass with the highest crossover, and its loop; None if none exceeds that of ``without``."""
     best: tuple[LoopFilter, Feedback] | None = None
     for mode in modes:
         highest = HIGHEST * sampling_rate
@@ -96,7 +96,7 @@ def with_filter(
 
 
 def _reached(model: PhysicalModel, sampling_rate: float, asked: Asked) -> float:
-    """Hz, the crossover of a loop; NaN where none has the margins."""
+    """Hz, the crossover of a loop; NaN if none has the margins."""
     try:
         return feedback(model, sampling_rate, asked).nominal.crossover
     except BadInput:

@@ -39,7 +39,7 @@ class Cascade:
 
 
 def cascade(model: PhysicalModel, asked: Asked = USUAL, calculation: float = 1.0) -> Cascade:
-    """The gains of the largest crossover, or of that which is asked for, whose margins hold for every sample of the parameters, estimator included.
+    """The gains of the largest (or requested) crossover whose margins hold for every sample of the parameters, including the estimator.
 
     calculation: cycles from reading to writing. Raises BadInput as ``feedback`` does.
     """

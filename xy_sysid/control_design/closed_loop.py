@@ -18,7 +18,7 @@ from xy_sysid.jit import compiled_text
 from xy_sysid.samples.block import FloatArray
 
 NO_LIMIT = 1e12  # V
-RESTS = 0.5  # s of rest, the second half of which shows how much noise shakes an axis
+RESTS = 0.5  # s at rest; the second half shows the motion caused by noise
 APART = "apart"  # the state of an effect with a gap: motor minus load, m
 
 
@@ -28,7 +28,7 @@ class Controller:
 
     kp: V/m; ki: V/m/s; kd: V s/m; derivative_time: s, of the first-order low-pass on de/dt (0: none)
     sections: (k, 5) second-order sections b0, b1, b2, a1, a2 that the feedback's voltage passes
-    limit: V; the integral stands still while the voltage is clipped and the error would drive it further (clamping)
+    limit: V; the integral is held while the voltage is clipped and the error would increase it (clamping)
     """
 
     kp: float
@@ -52,7 +52,7 @@ class Encoder:
 
     @property
     def white(self) -> Encoder:
-        """White noise alone, with the power of both: the mean over all places within a count (Widrow 1956)."""
+        """White noise with the power of noise and quantisation, averaged over all positions within a count (Widrow 1956)."""
         return Encoder(noise=math.sqrt(self.noise**2 + self.count**2 / 12.0))
 
 
@@ -61,7 +61,7 @@ class Tracked:
     """The motion of a simulated axis.
 
     position: (n,) reading of the encoder without noise, m; shown: (n,) with noise; voltage: (n,) V; error: (n,) path - position
-    carried: (n,) true position of the load, m: without the scale's error, and behind the gap if there is one
+    carried: (n,) true position of the load, m: without the scale's error, and behind the backlash if there is one
     """
 
     position: FloatArray
@@ -123,7 +123,7 @@ def _loop_of(library: Library) -> Callable[..., None]:
 def follow_path(
     model: AxisModel, path: SampledPath, controller: Controller, extra: FloatArray | None = None, encoder: Encoder | None = None, seed: int = 0
 ) -> Tracked:
-    """The axis along a path, from its begin and speed; extra: (n,) V of feedforward; seed: of the encoder's noise."""
+    """Simulate the axis along a path, from its start and speed; extra: (n,) V of feedforward; seed: of the encoder's noise."""
     ready, encoder = plant(model, path.sampling_rate), encoder or Encoder()
     library = model.library.looped([model.library[name] for name, _ in model.effects])
     count = path.position.size
@@ -153,7 +153,7 @@ def shake(model: AxisModel, place: float, sampling_rate: float, controller: Cont
 
 
 def _behind(ready: Plant) -> int:
-    """Place in the state of the distance across a gap, motor minus load; -1 of an axis without one."""
+    """Index in the state of the distance across a gap, motor minus load; -1 without one."""
     for name, _ in ready.model.effects:
         effect = ready.model.library[name]
         if APART in effect.states:

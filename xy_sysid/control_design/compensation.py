@@ -27,10 +27,10 @@ from xy_sysid.control_design.path import Moves, SampledPath, of_position
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
-ACROSS = 0.02  # s in which the correction by direction crosses a gap: a step of the path would hammer at it
-SLOWED, SLOWINGS = 0.7, 6  # of the speed, again and again, where the drive would reach its limit
-GONE = 0.01  # part of a friction that is as good as nothing
-RIGID = "base"  # what no model is without: gain, pole and delay
+ACROSS = 0.02  # s in which the correction by direction crosses a gap: a step would cause an impact
+SLOWED, SLOWINGS = 0.7, 6  # speed factor, and its repetitions, if the drive would reach its limit
+GONE = 0.01  # fraction of friction that is negligible
+RIGID = "base"  # part of every model: gain, pole and delay
 SIMPLE = "kS kV kA"
 
 
@@ -85,7 +85,7 @@ class _Tried:
 
 
 def asked_of_encoder(model: AxisModel, path: SampledPath, terms: Sequence[str]) -> SampledPath:
-    """The encoder readings for which the load is on the path: with the scale's error, and half of a gap towards the flank.
+    """The encoder readings with the load on the path: including the scale's error, and half the gap towards the flank.
 
     terms: effects that are corrected
     """
@@ -102,7 +102,7 @@ def asked_of_encoder(model: AxisModel, path: SampledPath, terms: Sequence[str]) 
 
 
 def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
-    """(n,) the flank of a gap that is in contact: 1 forth, -1 back, 0 where that is unknown.
+    """(n,) the flank of a gap that is in contact: 1 forward, -1 backward, 0 if unknown.
 
     Dry friction (``rub``, V, of what is carried) keeps it at the flank behind it. A load keeps it at one flank for good where it is larger than that
     friction, if it acts behind the gap; no encoder at the motor says on which side it acts. So the flank is known where both agree.
@@ -115,9 +115,9 @@ def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
 
 
 def alike(model: AxisModel, sampling_rate: float) -> tuple[AxisModel, ...]:
-    """The model written with other effects that are the very same law while it slides, and differ at rest.
+    """The model rewritten with other effects whose law is the same while sliding and differs at rest.
 
-    They are a sum's parts, half of each way, and the friction without a breakaway that is over before a sample shows it; sampling_rate: Hz
+    These are the parts of a sum, half in each direction, and friction whose breakaway ends within one sample; sampling_rate: Hz
     """
     joined = model.joined()
     found: list[AxisModel] = [joined, _without_breakaway(model, sampling_rate)]
@@ -136,7 +136,7 @@ def alike(model: AxisModel, sampling_rate: float) -> tuple[AxisModel, ...]:
 
 
 def _without_breakaway(model: AxisModel, sampling_rate: float) -> AxisModel:
-    """The model with Coulomb friction in place of a friction whose breakaway is over within one sample."""
+    """The model with Coulomb friction instead of friction whose breakaway ends within one sample."""
     for effect, values in of_category(model, "friction"):
         words = {"direction": 1.0}
         level_alone = [other.name for other in model.library.acting if other.is_dry and other.family == effect.family and len(other.parameters) == 1]
@@ -212,9 +212,9 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
 def compensate_within(
     models: Sequence[AxisModel], found: Gains, moves: Moves, controller: Controller, encoder: Encoder | None = None
 ) -> tuple[SampledPath, Compensation]:
-    """The path of the moves, slowed until no sample's drive comes nearer to its limit than ``RESERVE``.
+    """The path of the moves, slowed until the drive keeps ``RESERVE`` to its limit for every sample of the parameters.
 
-    Raises BadInput where it does even on a slow path, as under a controller that does not come to rest.
+    Raises BadInput if even a slow path exceeds it, for example with a controller that does not come to rest.
     """
     for scale in SLOWED ** np.arange(SLOWINGS):
         path = moves.sampled(float(scale))

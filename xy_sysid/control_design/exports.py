@@ -70,7 +70,7 @@ def _inverse_note(used: Used) -> str:
 
 
 def plain_name(axis: str) -> str:
-    """A name that every language takes."""
+    """A name that is valid in every language."""
     kept = "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in axis)
     return f"axis_{kept}"
 

@@ -24,12 +24,12 @@ from xy_sysid.errors import BadInput
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
-POSITION, INTEGRAL = 4.0, 10.0  # times below the crossover where position loop and integral begin: they cost 14 and 6 degrees there
-DERIVATIVE = 8.0  # times above it where the derivative is cut: 7 degrees
+POSITION, INTEGRAL = 4.0, 10.0  # factors below the crossover of the position loop and the integral: they cost 14 and 6 degrees there
+DERIVATIVE = 8.0  # factor above the crossover at which the derivative is cut: 7 degrees
 PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, and times: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3 ask for 30 to 60 and 2 to 5
-MOST_PHASE, MOST_GAIN = 90.0, 100.0  # that may be asked for
+MOST_PHASE, MOST_GAIN = 90.0, 100.0  # largest margins that may be requested
 COUNT = 24  # samples of the parameters
-STEPS = 60  # crossovers that are tried
+STEPS = 60  # number of crossovers to test
 TURN = 2.0 * math.pi  # rad
 HIGHEST = 0.25  # of the sampling rate, for a crossover
 ADVICE = "Ask for less bandwidth or smaller margins, or sample faster."
@@ -62,7 +62,7 @@ class Asked:
             raise BadInput("gain margin", f"{self.gain:g}", f"above 1, up to {MOST_GAIN:g} (times, not dB)", "Ask for 2 to 5.")
 
     def tries(self, sampling_rate: float, steps: int) -> list[float]:
-        """Hz, the bandwidths that are tried, the largest first. Raises BadInput out of range."""
+        """Hz, the bandwidths to test, the largest first. Raises BadInput if out of range."""
         if self.bandwidth is None:
             return [float(item) for item in np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, steps)]
         if not 0.0 < self.bandwidth <= HIGHEST * sampling_rate:
@@ -109,27 +109,27 @@ class Feedback:
 
     @property
     def position_gain(self) -> float:
-        """Of the position loop of a servo drive, 1/s."""
+        """Position gain of a servo drive, 1/s."""
         return self.crossover / POSITION
 
     @property
     def velocity_gain(self) -> float:
-        """Of its velocity loop, V/(m/s)."""
+        """Velocity gain of a servo drive, V/(m/s)."""
         return self.controller.kd
 
     @property
     def velocity_integral(self) -> float:
-        """Of its velocity loop's integral, V/m."""
+        """Integral gain of the velocity loop, V/m."""
         return self.controller.kd * self.crossover / INTEGRAL
 
     @property
     def integral_time(self) -> float:
-        """Of its velocity loop, s."""
+        """Integral time of the velocity loop, s."""
         return INTEGRAL / self.crossover
 
 
 def shaped(system: Sampled, crossover: float, sections: FloatArray, limit: float = NO_LIMIT) -> Controller:
-    """The controller whose loop with this system is 1 at the crossover, rad/s."""
+    """The controller whose loop gain with this system is 1 at the crossover, rad/s."""
     kp, ki = crossover / POSITION, crossover / INTEGRAL
     one = Controller(kp=kp + ki, ki=kp * ki, kd=1.0, derivative_time=1.0 / (DERIVATIVE * crossover), sections=sections, limit=limit)
     at = np.array([crossover / (2.0 * math.pi)])
@@ -140,19 +140,19 @@ def shaped(system: Sampled, crossover: float, sections: FloatArray, limit: float
 
 
 def sign_of(system: Sampled) -> float:
-    """Of the motion that a positive voltage makes in the end."""
+    """Sign of the final motion for a positive voltage."""
     slow = np.array([1e-5 * system.sampling_rate])
     return -1.0 if float(np.imag(system.response(slow)[0])) > 0.0 else 1.0
 
 
 def margins(system: Sampled, controller: Controller) -> Margins:
-    """Of the sampled loop."""
+    """Margins of the sampled loop."""
     loop = on_grid(system) * controller_response(controller, grid(system), system.sampling_rate)
     return margins_of(loop, grid(system), closed_poles(system, controller))
 
 
 def margins_of(loop: ComplexArray, frequency: FloatArray, poles: ComplexArray) -> Margins:
-    """Of an open loop at frequencies, Hz, between which it is straight in decibels and degrees; poles: of the closed loop.
+    """Margins of an open loop at frequencies, Hz, interpolated linearly in decibels and degrees; poles: of the closed loop.
 
     Source: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3.
     """
@@ -174,7 +174,7 @@ def margins_of(loop: ComplexArray, frequency: FloatArray, poles: ComplexArray) -
 
 
 def _share(values: FloatArray, at: NDArray[np.intp], level: FloatArray | float) -> FloatArray:
-    """Which part of the way from each of some values to the next one a level is passed."""
+    """Fraction of the distance from each value to the next at which a level is crossed."""
     return np.asarray((level - values[at]) / (values[at + 1] - values[at] + 1e-300))
 
 
@@ -201,9 +201,9 @@ def feedback(
     encoder: Encoder | None = None,
     limit: float = NO_LIMIT,
 ) -> Feedback:
-    """The controller of the largest crossover, or of that which is asked for, whose margins hold for every sample of the parameters.
+    """The controller of the largest (or requested) crossover whose margins hold for every sample of the parameters.
 
-    sections: filters that the feedback passes, (k, 5); encoder: whose noise is counted; limit: of the drive, V
+    sections: filters in series with the feedback, (k, 5); encoder: for its noise; limit: of the drive, V
     Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
     """
     systems = loop_systems(model, sampling_rate)
@@ -214,7 +214,7 @@ def feedback(
 
 
 def loop_systems(model: PhysicalModel, sampling_rate: float) -> list[Sampled]:
-    """The model and samples of its parameters, sampled, and the motor alone inside a gap: the systems with which a loop has to keep its margins.
+    """The sampled model for each sample of its parameters, and for the motor alone inside a gap: a loop must keep its margins with all of these.
 
     Raises BadInput where gain or pole are not determined by the data.
     """
@@ -237,7 +237,7 @@ def first_kept(
     worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
     for item in tried:
         nominal = worst = of(systems[0], item)
-        if asked.met(nominal) and nominal.crossover > 0.0:  # a loop that never comes to 1 does nothing
+        if asked.met(nominal) and nominal.crossover > 0.0:  # a loop gain that never reaches 1 has no effect
             worst = least([of(system, item) for system in systems])
             if asked.met(worst):
                 return item, nominal, worst
@@ -245,7 +245,7 @@ def first_kept(
 
 
 def within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
-    """The motor alone, where an effect says what share of the mass it has: across an open gap the loop meets less mass, and must hold there, too."""
+    """The motor alone, if an effect defines its share of the mass: inside an open gap the loop drives less mass and must keep its margins."""
     found = []
     for name, values in model.effects:
         share = dict(zip(model.library[name].names, values, strict=True)).get("share")

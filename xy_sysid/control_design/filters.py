@@ -1,7 +1,7 @@
 """Filters for the resonances of a model: a notch in the loop, and input shapers for the path, with Klipper's names.
 
-A drive that holds the encoder's side leaves what hangs on it free to swing at the antiresonance: that is the frequency to shape. The loop meets the
-resonance: that is the frequency to notch.
+A drive that controls the encoder's side leaves the attached mass free to oscillate at the antiresonance: this is the frequency to shape. The
+loop contains the resonance: this is the frequency to notch.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from xy_sysid.samples.block import FloatArray
 
 TOLERATED = 0.05  # of the unshaped vibration that an EI shaper leaves at its own frequency (Klipper: 1 / 20)
 WIDEST, NARROWEST = 0.7, 0.05  # damping ratio of a notch's poles
-UNIT = 1.0  # rad/s, the rate at which roots are asked for
+UNIT = 1.0  # rad/s, rate at which roots are computed
 HIGHEST = 0.45  # of the sampling rate: frequency of a filter in the loop
 
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """One mode: frequencies, Hz, and damping ratios of what swings while the encoder's side is held, and of the free axis."""
+    """One mode: frequencies, Hz, and damping ratios of the load with the encoder's side held, and of the free axis."""
 
     held: Derived
     held_damping: float
@@ -40,7 +40,7 @@ class Swing:
 
 @dataclass(frozen=True, slots=True)
 class LoopFilter:
-    """A second-order section in the loop: a notch that takes a resonance out, or a low-pass.
+    """A second-order section in the loop: a notch at a resonance, or a low-pass.
 
     kind: ``notch`` or ``low-pass``; frequency: Hz, of the resonance or the cut; depth: gain at it; width: damping ratio of its poles
     section: (5,) b0, b1, b2, a1, a2 at the sampling rate, Hz; covers: whether a notch's -3 dB width holds the interval of the frequency
@@ -55,7 +55,7 @@ class LoopFilter:
     covers: bool = True
 
     def phase_cost(self, at: float) -> float:
-        """Degrees that it takes at a frequency, Hz."""
+        """Phase lag of the section at a frequency, Hz, in degrees."""
         z = cmath.exp(2j * math.pi * at / self.sampling_rate)
         b0, b1, b2, a1, a2 = self.section.tolist()
         return -math.degrees(cmath.phase((b0 + b1 / z + b2 / z**2) / (1.0 + a1 / z + a2 / z**2)))
@@ -63,7 +63,7 @@ class LoopFilter:
 
 @dataclass(frozen=True, slots=True)
 class Shaper:
-    """Pulses that replace one.
+    """An input shaper: pulses that replace a single one.
 
     name: zv, mzv, zvd or ei; frequency: Hz; damping: ratio; amplitudes, times: (k,) sum 1, s
     vibration: part of the unshaped residual vibration that is left at the frequency; worst: over the interval of the frequency, 1 if that has no end
@@ -79,11 +79,11 @@ class Shaper:
 
     @property
     def duration(self) -> float:
-        """By which a path becomes longer, s."""
+        """Delay that the shaper adds to a path, s."""
         return self.times[-1]
 
     def shape(self, path: SampledPath) -> SampledPath:
-        """The path through the pulses."""
+        """The path after the shaper."""
         rate = path.sampling_rate
         start = path.position[0]
         tail = np.full(math.ceil(self.duration * rate), path.position[-1] - start)
@@ -96,7 +96,7 @@ class Shaper:
 
 
 def modes(model: PhysicalModel) -> tuple[Swing, ...]:
-    """The modes of the resonances in the model that swing (damping below 1), lowest first."""
+    """The modes of the oscillating resonances in the model (damping below 1), lowest first."""
     zeros, poles = _pairs(model.model)
     found = []
     for k, (zero, pole) in enumerate(zip(zeros, poles, strict=True)):
@@ -115,7 +115,7 @@ def _frequency(which: int, place: int) -> Callable[[AxisModel], float]:
 
 
 def _pairs(model: AxisModel) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """(natural frequency, Hz; damping ratio) of each pair of zeros, and of poles, by frequency; also of pairs that do not swing."""
+    """(natural frequency, Hz; damping ratio) of each pair of zeros, and of poles, by frequency; includes overdamped pairs."""
     parts = []
     for polynomial in sections(model, UNIT):
         roots = sorted(np.roots(polynomial[::-1]).tolist(), key=abs)
@@ -161,7 +161,7 @@ def low_pass(frequency: float, sampling_rate: float) -> LoopFilter:
 
 
 def shapers(mode: Swing) -> tuple[Shaper, ...]:
-    """ZV, MZV, ZVD and EI for what swings while the drive holds its side.
+    """ZV, MZV, ZVD and EI for the load's oscillation while the drive holds the encoder's side.
 
     Source: Singer & Seering, Preshaping command inputs, J. Dyn. Sys. Meas. Control 112 (1990); Singhose, Seering & Singer, Residual vibration
     reduction using vector diagrams, ASME J. Mech. Des. 116 (1994); MZV and all names as in Klipper's shaper_defs.
@@ -188,7 +188,7 @@ def shapers(mode: Swing) -> tuple[Shaper, ...]:
 
 
 def vibration(amplitudes: tuple[float, ...], times: tuple[float, ...], frequency: float, damping: float) -> float:
-    """Residual vibration at a frequency, Hz, over that of one pulse (Singer & Seering 1990, eq. 5)."""
+    """Residual vibration at a frequency, Hz, relative to that of one pulse (Singer & Seering 1990, eq. 5)."""
     w = 2.0 * math.pi * frequency
     swing = w * math.sqrt(1.0 - damping * damping)
     last = times[-1]
@@ -197,6 +197,6 @@ def vibration(amplitudes: tuple[float, ...], times: tuple[float, ...], frequency
 
 
 def best_shaper(found: tuple[Shaper, ...], tolerated: float = TOLERATED) -> Shaper:
-    """The shortest that leaves no more than ``tolerated`` over the interval of the frequency; else the one that leaves least."""
+    """The shortest shaper with at most ``tolerated`` residual vibration over the frequency's interval; else the one with the least."""
     good = [item for item in found if item.worst <= tolerated]
     return min(good, key=lambda item: item.duration) if good else min(found, key=lambda item: item.worst)

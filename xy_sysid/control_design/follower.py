@@ -1,4 +1,4 @@
-"""One axis along a path with three kinds of feedforward, one after another: voltages out, encoder readings in. A plan, and what carries it out.
+"""One axis along a path with three kinds of feedforward in turn: voltages out, encoder readings in. A plan and its execution.
 
 The feedback is calculated once for a block of samples, from the newest reading; the feedforward has a value for every sample.
 """
@@ -19,8 +19,8 @@ from xy_sysid.control_design.uncertain import later, samples
 from xy_sysid.samples.block import FloatArray
 
 KINDS = ("PID alone", "with kS, kV, kA", "compensated")
-DRAWS = 6  # samples of the parameters that a compensation is judged by
-APPROACH = 0.5  # of the bounds of the path, on the way to its begin
+DRAWS = 6  # samples of the parameters for the choice of a compensation
+APPROACH = 0.5  # of the path's bounds, on the way to its start
 QUIET = 0.5  # s at rest before each path, with its own feedforward
 
 
@@ -54,13 +54,13 @@ def plan(model: PhysicalModel, moves: Moves, block: int, limit: float, encoder: 
 
 
 class Follower:
-    """Carries out a plan: ``step`` takes the newest reading and gives the voltages of the next block, until ``over``.
+    """Executes a plan: ``step`` takes the newest reading and returns the voltages of the next block, until ``over``.
 
-    Each kind follows the path twice, and the second lap counts: in the first the integral learns what the feedforward leaves.
+    Each kind runs the path twice, and the second lap counts: in the first the integral settles to the residual error of the feedforward.
     """
 
     def __init__(self, made: Tryout, here: float, length: int | None = None) -> None:
-        """here: m, where the axis stands; length: samples of each path, at least, so that several axes begin together."""
+        """here: m, present position; length: least samples of each path, so that several axes start together."""
         self.plan = made
         size = max(length or 0, made.path.position.size)
         quiet = round(QUIET * made.path.sampling_rate)
@@ -72,7 +72,7 @@ class Follower:
         self._fresh: set[int] = set()
         for asked, extra in zip(made.asked, made.voltage, strict=True):
             self._fresh.add(sum(part.size for part in parts) // made.block)
-            parts += [np.full(quiet, float(asked[0])), _longer(asked, size)]  # a lap that does not count
+            parts += [np.full(quiet, float(asked[0])), _longer(asked, size)]  # first lap, not counted
             extras += [np.full(quiet, float(extra[0])), _longer(extra, size)]
             self._from.append(sum(part.size for part in parts))
             parts.append(_longer(asked, size))
@@ -94,23 +94,23 @@ class Follower:
 
     @property
     def over(self) -> bool:
-        """Nothing is left to be driven."""
+        """True if the plan is complete."""
         return self._at >= self._asked.size
 
     @property
     def kind(self) -> int | None:
-        """Which of ``KINDS`` is driven now; None on the way to the first."""
+        """Index of the current kind in ``KINDS``; None on the way to the first."""
         done = [k for k, first in enumerate(self._from) if self._at >= first]
         return done[-1] if done else None
 
     def see(self, shown: FloatArray) -> None:
-        """Readings (k,), m, that come after the last voltage."""
+        """Add readings (k,), m, after the last voltage."""
         self._shown += shown.tolist()
 
     def step(self, shown: FloatArray) -> FloatArray:
         """(block,) V for the next samples; shown: (k,) m, readings since the last call, the newest last."""
         own, block = self.plan.controller, self.plan.block
-        if self._at // block in self._fresh:  # what the integral has learnt with another feedforward is not its own
+        if self._at // block in self._fresh:  # reset the integral, which belongs to another feedforward
             self._total = 0.0
         self.see(shown)
         h = block / self.plan.path.sampling_rate
@@ -128,17 +128,17 @@ class Follower:
         return voltage
 
     def errors(self) -> list[FloatArray]:
-        """For each of ``KINDS`` that is driven to its end the error of every sample, m: path minus encoder."""
+        """For each completed kind of ``KINDS`` the error of every sample, m: path minus encoder."""
         found, shown = [], np.array(self._shown)
         size = self.plan.path.position.size
         for first in self._from:
-            start = first + 1  # the first reading was there before the first voltage
+            start = first + 1  # the first reading is from before the first voltage
             if start + size <= shown.size:
                 found.append(self.plan.path.position - shown[start : start + size])
         return found
 
 
 def _longer(values: FloatArray, size: int) -> FloatArray:
-    """The values, and the last of them until there are so many."""
+    """The values, extended to this size by repeating the last."""
     last = float(values[-1]) if values.size else 0.0
     return np.concatenate((values, np.full(max(size - values.size, 0), last)))

@@ -1,4 +1,4 @@
-"""kS, kV, kA, kG, kCos: the feedforward that drives and libraries ask for, with intervals.
+"""kS, kV, kA, kG, kCos: the feedforward gains of drives and libraries, with intervals.
 
     voltage = kS sign(v) + kV v + kA a + kG + kCos cos(angle - zero)
 
@@ -33,7 +33,7 @@ class Gains:
         return next(item for item in self.items if item.name == name)
 
     def value(self, name: str) -> float:
-        """Of a gain; 0 of one that this axis does not have, or that is in ``unsure``."""
+        """The value of a gain; 0 if the axis does not have it, or if it is in ``unsure``."""
         return next((item.value for item in self.items if item.name == name and name not in self.unsure), 0.0)
 
     @property

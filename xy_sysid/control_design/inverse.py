@@ -23,7 +23,7 @@ from xy_sysid.effects._contract import arguments
 from xy_sysid.jit import compiled_text
 from xy_sysid.samples.block import FloatArray
 
-HALF = 0.5  # of a sample: by which a held voltage acts late in the mean
+HALF = 0.5  # of a sample: mean delay of a held voltage
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Feedforward:
 
 
 def guided(ready: Plant) -> FloatArray:
-    """The generator in one row of an axis that is moved with a given acceleration, and of what hangs on it."""
+    """The generator, flattened, of an axis with prescribed acceleration and the masses attached to it."""
     n = ready.order
     made = ready.moving.reshape(n, n).copy()
     made[1, :] = 0.0
@@ -45,7 +45,7 @@ def guided(ready: Plant) -> FloatArray:
 
 
 def parts_of_sample(ready: Plant) -> int:
-    """In how many parts a sample is cut so that the series of what hangs on the axis holds."""
+    """Number of parts per sample for which the power series of the attached masses is accurate."""
     n = ready.order
     fastest = max((abs(root) for root in np.linalg.eigvals(ready.moving.reshape(n, n)[2 : n - 1, 2 : n - 1])), default=0.0)
     return max(math.ceil(float(fastest) / (resonant_loop.STIFF * ready.sampling_rate)), 1)
@@ -68,7 +68,7 @@ def feedforward(model: AxisModel, path: SampledPath, shake: float = 0.0) -> Feed
 
 
 def ahead_of(model: AxisModel, sampling_rate: float) -> float:
-    """s by which a path is looked at ahead: delay, half a sample of the hold, and what the inverse of each lag leaves of its time constant.
+    """s of path preview: delay, half a sample of the hold, and the remaining lead of each lag's inverse.
 
     That inverse is total + (total - old) / (exp(h / lag) - 1), which leads by h / (exp(h / lag) - 1) at low frequencies; h: a sample, s.
     """
@@ -98,7 +98,7 @@ def _run_of(library: Library) -> Callable[..., None]:
 
 
 def _along(writer: InverseText, name: str) -> str:
-    """The text of the loop over a path, with the sample's own text in it."""
+    """Source of the loop over a path, which contains the source of one sample."""
     sample = writer.text(f"{name}_sample").split("\n")
     head, body = sample[0], sample[1:]
     assert head.startswith("def ")

@@ -1,7 +1,7 @@
 """The text of one sample of the feedforward: the voltage that moves an axis model as a path asks, law by law against the direction of the signal.
 
-Encoder, resonances, base, forces, friction, lag and amplifier are undone in this order. What hangs on the encoder's side follows the path's own
-speed, so that a resonance is undone without differentiating anything. As ``step_text``: one text, compiled here and printed elsewhere.
+Encoder, resonances, base, forces, friction, lag and amplifier are inverted in this order. The attached masses follow the path's
+speed, so that a resonance is inverted without differentiation. As in ``step_text``: one text, compiled here and printed in other languages.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from xy_sysid.control_design.law_text import LawText, indented
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
 
-NUDGE = 1e-6  # m: by which the encoder's error is differentiated
-PASSES = 4  # of a force that asks for the voltage which is sought
-TRIES = 40  # of an amplifier's law: a zone of any width is left after that many of its own voltage
+NUDGE = 1e-6  # m: step for differentiating the encoder's error
+PASSES = 4  # iterations for a force that depends on the unknown voltage
+TRIES = 40  # iterations for an amplifier's law: enough to leave a dead zone of any width
 
 TEMPLATE = Template("""\
 def $name($signature):
@@ -90,7 +90,7 @@ class InverseText(LawText):
         return lines
 
     def _friction(self) -> list[str]:
-        """Levels; where there are bristles, they take these over, and remember."""
+        """Friction levels; bristles, if there are any, use them and have a state."""
         turn = self.numbers["turn"]
         lines = ["level = 0.0"]
         for effect in self.of("friction"):
@@ -109,13 +109,13 @@ class InverseText(LawText):
         return [*lines, f"if not ({self.acts(self.of('bristle'))}):", f"    {rubbing}", *bristled] if self.guarded else [*lines, *bristled]
 
     def _shaken(self, effect: Effect, state: str, calm: list[str]) -> list[str]:
-        """Noise moves the axis forth and back while it rests, and bristles that are moved so relax: half a sample each way."""
+        """Noise moves the axis back and forth at rest, and this relaxes the bristles: half a sample in each direction."""
         shake = self.numbers["shake"]
         halves = [f"{state} = {self.call(effect, 'bend', {'v': f'(v {way} {shake})', 'h': '0.5 * h', 'level': 'level'})}" for way in ("+", "-")]
         return [f"if {shake} > 0.0:", *("    " + line for line in halves), "else:", *("    " + line for line in calm)]
 
     def _forces(self) -> list[str]:
-        """Added once; as often as needed where one asks for the voltage itself."""
+        """Forces, added once; iterated if one depends on the voltage itself."""
         if not self.of("force"):
             return []
         lines: list[str] = ["pull = 0.0"]
@@ -127,7 +127,7 @@ class InverseText(LawText):
         return [f"for _ in range({PASSES}):", *("    " + line for line in lines)] if asks else lines
 
     def _lag(self) -> list[str]:
-        """A first-order lag needs more by its time constant times the rate of change; where it stands still it needs none."""
+        """Inverse of a first-order lag: adds its time constant times the rate of change; nothing at standstill."""
         lines: list[str] = []
         for effect in self.of("state"):
             if len(effect.states) == 1:
@@ -138,7 +138,7 @@ class InverseText(LawText):
         return lines
 
     def _inputs(self) -> list[str]:
-        """What comes out is compared with what is wanted, and as much is added; what cannot come out is not asked for."""
+        """Iterate the amplifier's input until its output matches the wanted value; values outside its range are not requested."""
         if not self.of("input"):
             return []
         lines = ["held = total"]

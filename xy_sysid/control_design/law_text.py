@@ -1,4 +1,4 @@
-"""Where a state holds what, and calls of the laws of effects as text: with the numbers of one model, or behind flags."""
+"""Layout of a state, and calls of the effects' laws as text: with the numbers of one model, or behind flags."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import Effect
 from xy_sysid.effects._binding import call
 
-X, V, Q = 0, 1, 2  # places in a state: position, speed, what hangs on it
+X, V, Q = 0, 1, 2  # indices in a state: position, speed, attached masses
 NUMBERS = ("gain", "pole", "turn", "h_old", "h_new", "cuts_old", "cuts_new", "back_old", "back_new", "n", "ring", "shake")
 
 
 @dataclass(frozen=True, slots=True)
 class StateLayout:
-    """Where a state holds what: position, speed and hanging masses first, then time, the ring's head, the effects' states, the ring."""
+    """Layout of a state: position, speed and attached masses first, then time, the ring's head, the effects' states, the ring."""
 
     effects: tuple[Effect, ...]
     hanging: int
 
     @property
     def time(self) -> int:
-        """Place of the time, s."""
+        """Index of the time, s."""
         return Q + self.hanging
 
     @property
     def head(self) -> int:
-        """Place of the ring's head."""
+        """Index of the ring's head."""
         return self.time + 1
 
     def state(self, effect: Effect, name: str) -> int:
-        """Place of a state of an effect."""
+        """Index of a state of an effect."""
         before = [(own.name, key) for own in self.effects for key in own.states]
         return self.head + 1 + before.index((effect.name, name))
 
     @property
     def ring(self) -> int:
-        """Place of the ring of voltages on their way."""
+        """Index of the ring of delayed voltages."""
         return self.head + 1 + sum(len(effect.states) for effect in self.effects)
 
 
@@ -60,11 +60,11 @@ class LawText:
         self.numbers = numbers or given_numbers()
 
     def of(self, *categories: str) -> list[Effect]:
-        """The effects of some categories, in the direction of the signal."""
+        """The effects of some categories, in the order of the signal path."""
         return sorted((effect for effect in self.effects if effect.category in categories), key=lambda effect: (effect.order, effect.name))
 
     def call(self, effect: Effect, function: str, words: Mapping[str, str]) -> str:
-        """A call of a law; words: what stands for each argument that is no parameter and no state."""
+        """A call of a law; words: text for each argument that is neither a parameter nor a state."""
         own = {name: self._value(effect, name) for name in effect.names}
         states = {name: f"s[{self.layout.state(effect, name)}]" for name in effect.states}
         return call(effect, function, {"gain": self.numbers["gain"], "pole": self.numbers["pole"], **states, **words, **own})
@@ -75,11 +75,11 @@ class LawText:
         return repr(float(dict(self.model.effects)[effect.name][effect.names.index(name)]))
 
     def guard(self, effect: Effect, lines: list[str]) -> list[str]:
-        """Lines that run only where the effect acts."""
+        """Lines that run only if the effect is active."""
         return [f"if {self.acts([effect])}:", *("    " + line for line in lines)] if self.guarded else lines
 
     def acts(self, effects: list[Effect]) -> str:
-        """Whether one of the effects acts."""
+        """An expression that is true if one of the effects is active."""
         return " or ".join(f"on[{self.effects.index(effect)}] != 0" for effect in effects) or "False"
 
 

@@ -1,4 +1,4 @@
-"""Forces of a refined model against the drive by speed and position: the laws of its simulation, evaluated one by one."""
+"""Forces of a refined model against the drive by speed and position: its simulation laws, evaluated one by one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
 from xy_sysid.samples.block import FloatArray
 
-LONG = 1e3  # s: after so long at a constant speed bristles slide
+LONG = 1e3  # s: after this long at a constant speed bristles slide
 
 
 def ask(effect: Effect, values: tuple[float, ...], function: str, words: Mapping[str, float]) -> float:
@@ -46,9 +46,9 @@ def friction(model: AxisModel, speed: float, direction: float) -> float:
 
 
 def force(model: AxisModel, speed: float, place: float, *, of_speed: bool | None = None, by_place: bool | None = None) -> float:
-    """Force against the drive at a speed and a place, V, without dry friction and the base's own drag.
+    """Force against the drive at a speed and a position, V, without dry friction and the base's own drag.
 
-    of_speed, by_place: only of laws that ask for speed, or for the place (True), or that do not (False)
+    of_speed, by_place: only laws that depend on speed, or on position (True), or that do not (False)
     """
     total = 0.0
     for effect, values in of_category(model, "force"):
@@ -58,7 +58,7 @@ def force(model: AxisModel, speed: float, place: float, *, of_speed: bool | None
         if by_place is not None and ("x" in words) != by_place:
             continue
         if "u" in words:
-            continue  # it changes what the voltage does, and is no force of its own
+            continue  # it changes the effect of the voltage and is not a force of its own
         total += ask(effect, values, "force", {"v": speed, "x": place, "t": 0.0, "u": 0.0, "gain": model.gain, "pole": model.pole})
     return total
 
@@ -90,7 +90,7 @@ def largest_voltage(model: AxisModel) -> float:
 
 
 def along(model: AxisModel, places: FloatArray, what: str) -> FloatArray:
-    """(n,) at places, m: ``force`` at rest, V; ``scale`` error, m; ``gain`` factor; ``drag`` beyond the base's own, V s/m."""
+    """(n,) at positions, m: ``force`` at rest, V; ``scale`` error, m; ``gain`` factor; ``drag`` in addition to the base's, V s/m."""
     kinds: dict[str, Callable[[float], float]] = {
         "force": lambda x: force(model, 0.0, x, of_speed=False, by_place=True),
         "scale": lambda x: scale_error(model, x),
@@ -101,5 +101,5 @@ def along(model: AxisModel, places: FloatArray, what: str) -> FloatArray:
 
 
 def lost_in(language: str, effect: Effect) -> str:
-    """What is lost of an effect in a format that keeps only the mean level of dry friction."""
+    """The part of an effect that is lost in a format with only the mean level of dry friction."""
     return "only its mean level at speed is kept" if effect.is_dry else f"{language} cannot express it"

@@ -15,11 +15,11 @@ from xy_sysid.control_design.path import Bounds, SampledPath, s_curve
 from xy_sysid.control_design.sample_step import sections
 from xy_sysid.errors import BadInput
 
-RESERVE = 0.2  # of the limit that is left to the feedback
-SHARES = np.linspace(0.15, 0.85, 8)  # of the voltage for speed, the rest for acceleration, that are tried
+RESERVE = 0.2  # of the limit, reserved for the feedback
+SHARES = np.linspace(0.15, 0.85, 8)  # shares of the voltage for speed to test; the rest is for acceleration
 ROUNDS, LOWEST = 10, 0.01  # of halving, to 1e-3, down to a hundredth of what the rigid axis could do
-PLACES = 101  # between two ends, at which forces are asked
-JERK_TIME = 0.02  # s at least in which an acceleration is built up, where nothing rings
+PLACES = 101  # positions between two ends at which forces are evaluated
+JERK_TIME = 0.02  # least s for building up an acceleration, if there is no resonance
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +75,13 @@ def fastest(models: Sequence[AxisModel], places: Sequence[float], limit: float, 
 
 
 def _at_rest(model: AxisModel, low: float, high: float) -> float:
-    """The largest voltage that a start from rest needs between two places, V."""
+    """The largest voltage needed for a start from rest between two positions, V."""
     rubs = max(friction(model, 0.0, 1.0), friction(model, 0.0, -1.0))
     return rubs + max(abs(force(model, 0.0, float(x))) for x in np.linspace(low, high, PLACES))
 
 
 def _ringing(model: AxisModel, sampling_rate: float) -> float:
-    """Period of the slowest that hangs on the axis, s: an acceleration that is built up within one excites it least."""
+    """Period of the slowest mode of the axis, s: an acceleration that is built up within one period excites it least."""
     top, _ = sections(model, sampling_rate)
     if top.size == 1:
         return 0.0

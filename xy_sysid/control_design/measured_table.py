@@ -1,8 +1,8 @@
 """A table, measured on a recording, of the force by position that the model does not explain.
 
-A ball screw has cogging of many periods, and a cable pulls in its own way; a table can represent such forces without a law. The recorded input
-that the model does not predict is averaged as a function of position, linear between places. Cross-validation decides the distance of the places,
-and whether there is a table: the table of one half of the recording is judged on the other half.
+A ball screw has cogging of many periods, and the force of a cable has no simple law; a table can represent such forces. The part of the recorded
+input that the model does not predict is averaged as a function of position, linear between grid points. Cross-validation selects the grid spacing
+and whether there is a table at all: the table of one half of the recording is judged on the other half.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
 
-BLOCKS = 10  # of the recording, over which a gain is compared with its own scatter
-SURE = 3.0  # standard errors by which a table has to gain, as the best of several is taken
-SHRUNK = 1.0  # sample of no force at each place, so that a place that was not passed gets none
+BLOCKS = 10  # of the recording, to compare a gain with its scatter
+SURE = 3.0  # standard errors of gain that a table needs, because the best of several is selected
+SHRUNK = 1.0  # weight of zero force at each grid point, in samples, so that points without data get none
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class MeasuredTable:
         return np.concatenate([np.interp(places, self.at, table) for places, table in zip(ends, self.parts[::-1], strict=True)])
 
     def correction(self, model: PhysicalModel) -> Correction:
-        """The same as a table with 95 % intervals."""
+        """The table as a correction with 95 % intervals."""
         return Correction(
             name="residual",
             at=self.at,

@@ -19,16 +19,16 @@ from xy_sysid.control_design.sample_step import sections
 from xy_sysid.effects import Effect
 from xy_sysid.samples.block import FloatArray
 
-SHORT = 1e-6  # m: deflection of bristles that stand for friction which falls with speed and has none
+SHORT = 1e-6  # m: deflection of bristles that represent friction which falls with speed
 CRITICAL = 0.5  # of the damping at which such bristles do not swing on the mass
-TINY = 1e-9  # motor constant of a motor that only rubs or cogs
+TINY = 1e-9  # motor constant of a motor that has only friction or cogging
 RUBBING = 64_000.0  # Hz of the steps with dry friction: it leaves 0.2 % of the motion there, and 2 % at 16 kHz
 EXACT = 1e-6  # of the largest force: by which a law may differ from what it is said to be
 
 
 @dataclass(slots=True)
 class Said:
-    """What was said so far.
+    """The MJCF content so far.
 
     polynomial: (4,) of the position, V, lowest power first; square: drag over the square of speed, V/(m/s)2
     waves: (name, amplitude, wave number, phase); lost: (effect, why)
@@ -107,7 +107,7 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
 
 
 def _steps(model: AxisModel, sampling_rate: float, fine: float) -> int:
-    """Steps in a sample, at least ``fine`` a second: of up to 1.5 times the least, the number that makes the delay nearest to whole steps."""
+    """Steps per sample, at least ``fine`` per second: up to 1.5 times the least, so that the delay is closest to an integer number of steps."""
     least = max(math.ceil(fine / sampling_rate), 1)
     late = model.delay * sampling_rate
     return min(range(least, least + max(least // 2, 1) + 1), key=lambda count: (round(abs(late * count - round(late * count)) / count, 6), count))
@@ -118,7 +118,7 @@ def _num(value: float) -> str:
 
 
 def _forces(model: AxisModel, said: Said) -> None:
-    """Forces by place are waves or polynomials of the third order; constant ones go with them."""
+    """Add forces by position as waves or cubic polynomials; constant ones are included in these."""
     for effect, values in of_category(model, "force"):
         words = asks(effect)
         if "u" in words:
@@ -134,7 +134,7 @@ def _forces(model: AxisModel, said: Said) -> None:
 
 
 def _square(effect: Effect, values: tuple[float, ...], model: AxisModel, said: Said) -> bool:
-    """Whether a law is drag with the square of speed, against the motion."""
+    """True if a law is quadratic drag; then it is added."""
     fast = abs(model.gain)
 
     def at(v: float) -> float:
@@ -148,7 +148,7 @@ def _square(effect: Effect, values: tuple[float, ...], model: AxisModel, said: S
 
 
 def _wave(effect: Effect, values: tuple[float, ...], model: AxisModel, said: Said) -> bool:
-    """Whether a law is one sine of the position: then it is a wave."""
+    """True if a law is one sine of the position; then it is added as a wave."""
     if not effect.repeats:
         return False
     period = dict(zip(effect.names, values, strict=True)).get("period", 2.0 * math.pi)
@@ -249,7 +249,7 @@ def _inputs(model: AxisModel, said: Said) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Hung:
-    """Two masses (V s2/m) with drag of their own (V s/m), the spring (V/m) and damper (V s/m) between them; the first carries the encoder."""
+    """Two masses (V s2/m) with drag (V s/m), and the spring (V/m) and damper (V s/m) between them; the first carries the encoder."""
 
     masses: tuple[float, float]
     drags: tuple[float, float]
@@ -258,7 +258,7 @@ class Hung:
 
 
 def _bodies(model: AxisModel, said: Said) -> tuple[float, float, Hung | None]:
-    """Mass and drag at the joint, and what hangs behind it.
+    """Mass and drag at the joint, and the mass attached to it.
 
     Base and table are one pole-zero pair, which two masses on a spring have too. With P, Z = 1 at 0 Hz, (m s + c) P has to be
     (J s + c1) Z + (M s + c2) (1 + (d / k) s) with Z = 1 + ((d + c2) / k) s + (M / k) s2: six equations for J, M, c1, c2, d and k.

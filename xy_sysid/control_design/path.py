@@ -13,7 +13,7 @@ import scipy
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
-ORDER = 4  # of the low-pass, forth and back
+ORDER = 4  # of the low-pass, applied forward and backward
 SETTLE = 0.2  # s at rest between two moves
 
 
@@ -34,7 +34,7 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Moves:
-    """From place to place: places: m; bounds: of each move; sampling_rate: Hz."""
+    """Moves between positions: places: m; bounds: of each move; sampling_rate: Hz."""
 
     places: Sequence[float]
     bounds: Bounds
@@ -57,15 +57,15 @@ class SampledPath:
 
     @property
     def seconds(self) -> float:
-        """Length in time."""
+        """Duration, s."""
         return self.position.size / self.sampling_rate
 
     def part(self, start: int, end: int) -> SampledPath:
-        """Its samples from ``start`` to before ``end``."""
+        """The samples from ``start`` to before ``end``."""
         return SampledPath(self.sampling_rate, self.position[start:end], self.speed[start:end], self.acceleration[start:end])
 
     def ahead(self, seconds: float) -> SampledPath:
-        """The same path as it will be so much later; it stands at its end."""
+        """The path advanced by this time; it holds its last position at the end."""
         times = np.arange(self.position.size) + seconds * self.sampling_rate
         last = self.position.size - 1
         whole = np.minimum(times.astype(np.int64), last)
@@ -75,7 +75,7 @@ class SampledPath:
 
 
 def s_curve(places: Sequence[float], bounds: Bounds, sampling_rate: float, settle: float = SETTLE) -> SampledPath:
-    """From place to place, m, each move as fast as the bounds allow, with rests of ``settle`` s between.
+    """Moves between positions, m, each as fast as the bounds allow, with rests of ``settle`` s in between.
 
     A move is a step of position through three moving averages whose lengths are distance / speed, speed / acceleration and acceleration / jerk,
     so that speed, acceleration and jerk stay within their bounds. Source: Biagiotti & Melchiorri, SampledPath Planning for Automatic Machines and
@@ -115,7 +115,7 @@ def of_position(position: FloatArray, sampling_rate: float) -> SampledPath:
 
 
 def recorded(position: FloatArray, sampling_rate: float, below: float) -> SampledPath:
-    """The measured position (n,), m, below a frequency, Hz, filtered without delay. Raises BadInput where the recording is too short."""
+    """The measured position (n,), m, below a frequency, Hz, filtered without delay. Raises BadInput if the recording is too short."""
     top = 0.45 * sampling_rate
     if position.size < 64:
         raise BadInput("samples of the recording", f"{position.size}", "64 or more", "Give a longer one.")

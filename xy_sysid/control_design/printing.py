@@ -1,4 +1,4 @@
-"""Walks a program and prints its statements and expressions; a language says how each looks."""
+"""Prints the statements and expressions of a program; subclasses define the syntax of a language."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ COMPARISONS: dict[type, str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE
 
 
 class Printer(ABC):
-    """What C and MATLAB have in common; a subclass prints calls, places in arrays, loops, powers and choices in its own way."""
+    """Common parts of C and MATLAB; a subclass prints calls, array elements, loops, powers and conditional values."""
 
     AND, OR, NOT, UNEQUAL = "&&", "||", "!", "!="
 
@@ -25,13 +25,13 @@ class Printer(ABC):
         self.lines.append("    " * self.depth + text if text else "")
 
     def refuse(self, node: ast.AST) -> BadInput:
-        """For what this small language does not have."""
+        """The error for syntax that this small language does not support."""
         return BadInput(
             "law", f"written with {type(node).__name__}", "numbers, arithmetic, if, for and functions of math", "Write it in simpler terms."
         )
 
     def expression(self, node: ast.expr) -> str:
-        """Its text; parts that need it stand in brackets."""
+        """The text of an expression, in brackets where needed."""
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
             return self.number(node.value)
         if isinstance(node, ast.Name):
@@ -55,7 +55,7 @@ class Printer(ABC):
         raise self.refuse(node)
 
     def comparison(self, node: ast.Compare) -> str:
-        """Also of several in a row."""
+        """The text of a comparison, also of a chain."""
         parts, left = [], node.left
         for operator, right in zip(node.ops, node.comparators, strict=True):
             word = self.UNEQUAL if isinstance(operator, ast.NotEq) else COMPARISONS[type(operator)]
@@ -80,7 +80,7 @@ class Printer(ABC):
         self.depth -= 1
 
     def name(self, name: str) -> str:
-        """Of a variable."""
+        """The name of a variable in the language."""
         return name
 
     @abstractmethod
@@ -97,7 +97,7 @@ class Printer(ABC):
 
     @abstractmethod
     def choice(self, test: str, yes: str, no: str) -> str:
-        """One of two values, by a test."""
+        """A conditional value."""
 
     @abstractmethod
     def call(self, node: ast.Call) -> str:
@@ -109,13 +109,13 @@ class Printer(ABC):
 
 
 def math_name(node: ast.Call) -> str | None:
-    """The name of a function of math that is called; None of any other."""
+    """The name of a called function of math; None for any other."""
     at = node.func
     return at.attr if isinstance(at, ast.Attribute) and isinstance(at.value, ast.Name) and at.value.id == "math" else None
 
 
 def range_of(node: ast.For) -> list[ast.expr]:
-    """First and end of a loop over whole numbers."""
+    """First and end of a loop over integers."""
     if isinstance(node.iter, ast.Call) and isinstance(node.iter.func, ast.Name) and node.iter.func.id == "range":
         given = list(node.iter.args)
         return given if len(given) == 2 else [ast.Constant(0), given[0]]

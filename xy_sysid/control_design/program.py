@@ -1,6 +1,6 @@
 """A refined model as a program in a small language: functions of numbers and flat arrays, from which C, Python and MATLAB are printed.
 
-The functions are the laws of its effects as they stand in their files, the series, one sample of the simulation and one of the feedforward.
+The functions are the effects' laws from their files, the series, one sample of the simulation and one of the feedforward.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
 ARRAYS = frozenset({"s", "w", "a", "still", "moving", "guided"})  # arguments that are arrays
-WHOLE = frozenset({"n", "cuts"})  # arguments that are whole numbers
+WHOLE = frozenset({"n", "cuts"})  # integer arguments
 NAMED = {"cuts_old", "cuts_new", "back_old", "back_new", "n", "ring"}
 
 
@@ -47,14 +47,14 @@ class Program:
 
     @property
     def rate(self) -> float:
-        """Hz, at which both are called."""
+        """Hz, rate at which both are called."""
         return self.plant.sampling_rate
 
 
 def program(model: AxisModel, sampling_rate: float, inverse: AxisModel | None = None) -> Program:
-    """The model at one rate. Raises BadInput for an effect whose law is written in more than this language has.
+    """The model at one rate. Raises BadInput for an effect whose law uses syntax outside this language.
 
-    inverse: the model whose laws the feedforward undoes; the model itself where none is given
+    inverse: the model whose laws the feedforward inverts; the model itself by default
     """
     ready = plant(model, sampling_rate, whole=False)
     undone = ready if inverse is None else plant(inverse, sampling_rate, whole=False)
@@ -82,7 +82,7 @@ def _numbers(ready: Plant) -> dict[str, str]:
 
 
 def _function(item: Callable[..., Any], name: str, known: dict[str, Any] | None = None) -> ast.FunctionDef:
-    """The function of a file under another name, without decorators and types, with the numbers of its module in place of their names."""
+    """A function from a file under another name, without decorators and types, with module constants replaced by their values."""
     plain = getattr(item, "py_func", item)
     try:
         made = _only(ast.parse(textwrap.dedent(inspect.getsource(plain))))
@@ -99,7 +99,7 @@ def _function(item: Callable[..., Any], name: str, known: dict[str, Any] | None 
 
 
 class _Numbers(ast.NodeTransformer):
-    """Puts constants of a module where their names stand."""
+    """Replaces names of module constants by their values."""
 
     def __init__(self, numbers: dict[str, Any]) -> None:
         self.numbers = numbers
@@ -122,7 +122,7 @@ def _only(module: ast.Module) -> ast.FunctionDef:
 
 
 def _reached(start: Iterable[ast.FunctionDef], known: list[ast.FunctionDef]) -> list[ast.FunctionDef]:
-    """Those of some functions that are called, in their order."""
+    """The functions that are called, in their order."""
     by_name = {item.name: item for item in known}
     found: set[str] = set()
     todo = list(start)
@@ -151,7 +151,7 @@ def names_assigned(function: ast.FunctionDef) -> list[str]:
 
 
 def whole_names(function: ast.FunctionDef) -> set[str]:
-    """Names that hold whole numbers only."""
+    """Names of integer variables."""
     values: dict[str, list[ast.expr | None]] = {}
     for node in ast.walk(function):
         if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
@@ -190,6 +190,6 @@ def returns_of(function: ast.FunctionDef) -> int:
 
 
 def independent(targets: ast.Tuple, values: ast.Tuple) -> bool:
-    """Whether several assignments at once are the same one after another: no value reads what another assigns."""
+    """True if a tuple assignment equals assignments in sequence: no value reads what another assigns."""
     set_to = {node.id for part in targets.elts for node in ast.walk(part) if isinstance(node, ast.Name)}
     return not any(isinstance(node, ast.Name) and node.id in set_to for part in values.elts for node in ast.walk(part))

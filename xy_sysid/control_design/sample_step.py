@@ -1,4 +1,4 @@
-"""A refined model simulated sample by sample, as a controller needs it: its generator, its numbers, its state."""
+"""A refined model simulated sample by sample, as a controller needs it: generator, numbers, state."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LONGEST = 4096  # samples of delay that fit into a state
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """An axis model at one rate, ready to be moved.
+    """An axis model at one rate, ready for simulation.
 
     parameters, flags: of the whole library; numbers: of ``NUMBERS``; moving, still: generators in one row; layout: of its state
     """
@@ -45,7 +45,7 @@ class Plant:
 
     @property
     def order(self) -> int:
-        """n: position, speed, hanging masses and force."""
+        """n: number of position, speed, attached masses and force."""
         return round(math.sqrt(self.moving.size))
 
     def number(self, name: str) -> float:
@@ -76,11 +76,11 @@ def sections(model: AxisModel, sampling_rate: float) -> tuple[FloatArray, FloatA
 
 
 def plant(model: AxisModel, sampling_rate: float, whole: bool = True, shake: float = 0.0) -> Plant:
-    """The model at this rate. whole: for the loop of the whole library, else with the layout of this model alone, for printing.
+    """The model at this rate. whole: for the loop of the full library, else with the layout of this model alone, for printing.
 
-    shake: m/s, mean absolute speed that noise gives the axis while it rests, which the feedforward expects
+    shake: m/s, mean absolute speed due to noise at rest, which the feedforward takes into account
 
-    Raises BadInput for a delay beyond reason, or a resonance that has no roots in s.
+    Raises BadInput for an implausible delay, or a resonance without roots in s.
     """
     top, bottom = sections(model, sampling_rate)
     if top.size > 1:
@@ -133,7 +133,7 @@ def plant(model: AxisModel, sampling_rate: float, whole: bool = True, shake: flo
 
 
 def most_hanging(effects: tuple[Effect, ...]) -> int:
-    """Numbers that hang on an axis with all resonances of a library."""
+    """Number of states of the attached masses with all resonances of a library."""
     return 2 * sum(effect.category == "motion" for effect in effects)
 
 
@@ -147,7 +147,7 @@ def step_of(library: Library) -> Callable[..., float]:
 
 
 def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray, start: float = 0.0) -> FloatArray:
-    """(n,) position shown at each sample under a voltage (n,), from the speed ``start`` at position 0, m: nothing but the input drives it."""
+    """(n,) encoder position at each sample for a voltage (n,), from speed ``start`` at position 0, m; the input is the only drive."""
     ready = plant(model, sampling_rate)
     step, state, room = step_of(model.library.looped([model.library[name] for name, _ in model.effects])), ready.rest(), np.zeros(ROOM * ready.order)
     begin(ready, state, start)
@@ -158,7 +158,7 @@ def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray, 
 
 
 def begin(ready: Plant, state: FloatArray, speed: float, position: float = 0.0) -> None:
-    """The state moves at this speed, and what hangs on the axis with it."""
+    """Set the state to this speed, including the attached masses."""
     top, _ = sections(ready.model, ready.sampling_rate)
     state[0], state[1] = position, speed
     if top.size > 1:

@@ -18,11 +18,11 @@ from xy_sysid.control_design.sample_step import plant
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
-EVENLY = 2048  # frequencies of a mean over all of them
-LINES = 600  # frequencies of a response, evenly by ratio
-TURNED = np.linspace(-89.0, 89.0, 60)  # degrees that a resonance has turned, at frequencies around it
+EVENLY = 2048  # number of evenly spaced frequencies for a mean
+LINES = 600  # number of frequencies of a response, logarithmic
+TURNED = np.linspace(-89.0, 89.0, 60)  # phase of a resonance, degrees, at the additional frequencies around it
 LinearSystem = tuple[FloatArray, FloatArray, FloatArray, float]  # A, B, C, D of a sampled controller
-KEPT = 256  # sampled models, and responses, that are remembered: those of a design are asked for again and again
+KEPT = 256  # cached models and responses: a design uses the same ones repeatedly
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +66,7 @@ class Sampled:
 
 @functools.lru_cache(maxsize=KEPT)
 def grid(system: Sampled) -> FloatArray:
-    """(n,) Hz, frequencies at which its loop is looked at: evenly by ratio, and around each resonance evenly by the phase that it turns.
+    """(n,) Hz, frequencies for the loop: logarithmic, and additional ones around each resonance with even steps of its phase.
 
     The phase of a pole s = w (-damping + j) turns by atan(x) at w (1 + damping x).
     """
@@ -85,7 +85,7 @@ def on_grid(system: Sampled) -> ComplexArray:
 
 @functools.lru_cache(maxsize=KEPT)
 def sampled(model: AxisModel, sampling_rate: float) -> Sampled:
-    """Base, resonances, lags and delay of a model; everything else is left out."""
+    """Base, resonances, lags and delay of a model; everything else is omitted."""
     ready = plant(model, sampling_rate)
     n = ready.order - 1
     whole = ready.moving.reshape(n + 1, n + 1)
@@ -112,7 +112,7 @@ def response_of(a: FloatArray, b: FloatArray, c: FloatArray, d: float, frequency
 
 
 def _held(a: FloatArray, b: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray]:
-    """Transition over a time and what a held input adds."""
+    """Transition matrix over a time, and the response to a held input."""
     n = b.size
     made = scipy.linalg.expm(np.block([[a, b[:, None]], [np.zeros((1, n + 1))]]) * seconds)
     return made[:n, :n], made[:n, n]
@@ -140,7 +140,7 @@ def coefficients(controller: Controller, sampling_rate: float) -> FloatArray:
 
 
 def controller_system(controller: Controller, sampling_rate: float) -> LinearSystem:
-    """(A, B, C, D) of the same controller from error to voltage."""
+    """(A, B, C, D) of the controller from error to voltage."""
     h, keeps = 1.0 / sampling_rate, controller.keeps(sampling_rate)
     a = np.array([[1.0, 0.0, 0.0], [0.0, keeps, -(1.0 - keeps) / h], [0.0, 0.0, 0.0]])
     b = np.array([controller.ki * h, (1.0 - keeps) / h, 1.0])
@@ -162,7 +162,7 @@ def closed_poles(system: Sampled, controller: Controller) -> ComplexArray:
 
 
 def looped_poles(system: Sampled, controller: LinearSystem) -> ComplexArray:
-    """The same with any linear controller from error to voltage."""
+    """Closed-loop poles with any linear controller from error to voltage."""
     a, b, c = system.whole_system()
     ka, kb, kc, kd = controller
     top = np.hstack((a - kd * np.outer(b, c), np.outer(b, kc)))
@@ -171,7 +171,7 @@ def looped_poles(system: Sampled, controller: LinearSystem) -> ComplexArray:
 
 
 def noise_to_voltage(system: Sampled, controller: Controller) -> float:
-    """V rms that 1 m rms of white encoder noise makes in the closed loop: the rms of its response over all frequencies; infinite if unstable."""
+    """V rms per 1 m rms of white encoder noise in the closed loop: rms of the response over all frequencies; infinite if unstable."""
     if np.max(np.abs(closed_poles(system, controller))) >= 1.0:
         return float("inf")
     frequency = (np.arange(EVENLY) + 0.5) / EVENLY * 0.5 * system.sampling_rate

@@ -1,4 +1,4 @@
-"""Base and resonances over a part of a sample, as powers of time: the linear part of every printed simulation.
+"""Base and resonances over a part of a sample, as power series in time: the linear part of every printed simulation.
 
 A state is (x, v, q_0 .. q_(m-1)) as in ``axis.resonant_loop``, n = m + 3 with the force that drives it; ``a`` is its generator (n, n) in one
 row. The sub-steps are so short that ten powers are exact to 1e-9. These functions are printed in other languages as they stand, so
@@ -11,12 +11,12 @@ from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 
 TERMS = 10
-ROUNDS = 60  # of Newton's method, held by halving
+ROUNDS = 60  # of Newton's method, safeguarded by bisection
 
 
 @compiled
 def unfold(a: FloatArray, n: int, s: FloatArray, force: float, w: FloatArray) -> None:
-    """w: the state from now on as powers of time, under a constant force."""
+    """Write to w the state as a power series in time from now on, under a constant force."""
     for i in range(n - 1):
         w[i] = s[i]
     w[n - 1] = force
@@ -49,7 +49,7 @@ def speed_after(n: int, w: FloatArray, h: float) -> float:
 
 @compiled
 def stops_after(n: int, w: FloatArray, h: float) -> float:
-    """When the speed changes its sign between 0 and ``h``, s."""
+    """Zero crossing of the speed between 0 and ``h``, s."""
     low = 0.0
     high = h
     t = 0.5 * h
@@ -78,7 +78,7 @@ def stops_after(n: int, w: FloatArray, h: float) -> float:
 
 @compiled
 def tug(a: FloatArray, n: int, s: FloatArray) -> float:
-    """What the hanging masses add to the force at this instant, V."""
+    """Force of the attached masses at this instant, V."""
     total = 0.0
     for j in range(2, n - 1):
         total += a[n + j] * s[j] / a[n + n - 1]

@@ -15,7 +15,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
 DEGREE = TURN / 360.0  # rad
-LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margin without a filter on the derivative: less is near the end for a machine that warms up
+LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margins without a filter on the derivative; smaller is near instability
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Designed:
 
     @property
     def units(self) -> Units:
-        """Of the model."""
+        """Units of the model."""
         return self.model.units
 
 
@@ -152,7 +152,7 @@ def odrive(of: Designed) -> Snippet:
         f"{at}.controller.config.inertia = {torque}{of.gains.value('kA') * TURN:.6g}{_unsure(of, 'kA', '  # ')}",
     ]
     limit = loop.controller.limit
-    if limit < NO_LIMIT:  # of the sum of its feedback and its feedforward
+    if limit < NO_LIMIT:  # limit of the sum of feedback and feedforward
         lines += [f"{at}.config.torque_soft_{end} = {torque}{size:.6g}" for end, size in (("max", limit), ("min", -limit))]
     note = (
         f"designed for ODrive's own loops at {RATE:g} Hz with its encoder estimator of {ESTIMATOR:g} rad/s, which firmware before 0.6 calls "

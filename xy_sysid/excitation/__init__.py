@@ -1,13 +1,13 @@
 """Excitation signals: a pure stream of voltage samples for one axis.
 
-``signal(settings, rate).next(n)`` gives the following samples; any chunking gives the same stream, bit for bit.
+``signal(settings, rate).next(n)`` returns the following samples; any chunking gives the same stream, bit for bit.
 
     contract:                                      what every signal is
-    multisine, sweep, stepped, noise, prbs, pulse: one kind of signal a file
-    drive:                                         from a signal to the voltage that is really applied: ramps, centring, limits
+    multisine, sweep, stepped, noise, prbs, pulse: one kind of signal per file
+    drive:                                         from a signal to the applied voltage: ramps, centring, limits
     trajectory, motion_plan, trajectory_drive:     a motion within limits of position, speed and acceleration, in pieces that end at rest
-    motion_check:                                  does each axis do what its voltage can do?
-    travel_limits:                                 the guard of the ends of travel
+    motion_check:                                  whether the motion of each axis fits its voltage
+    travel_limits:                                 keeps axes away from the ends of travel
     designed:                                      an experiment from a file, within the machine's own limits
     pacing:                                        when the next block is due
     lockstep:                                      a machine driven without a clock: recordings for tests and simulations

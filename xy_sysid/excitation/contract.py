@@ -1,4 +1,4 @@
-"""What every excitation signal promises, and the two ways to keep the promise: a table that repeats, and a stream of parts."""
+"""The interface of every excitation signal, and two implementations: a table that repeats, and a stream of parts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_TABLE = 2**24  # samples of one period kept in memory (128 MB); 2.3 hours at
 
 
 class Signal(Protocol):
-    """An endless stream of samples in V; the same samples, bit for bit, however they are asked for."""
+    """An endless stream of samples in V; any chunking gives the same samples, bit for bit."""
 
     def next(self, n: int) -> FloatArray:
         """(n,) the following samples, V."""
@@ -28,7 +28,7 @@ Maker = Callable[[AxisExcitation, float], Signal]
 
 @dataclass(slots=True)
 class Periodic:
-    """A table of one period, (period,) V, repeated for ever."""
+    """A table of one period, (period,) V, repeated without end."""
 
     table: FloatArray
     _at: int = 0
@@ -42,7 +42,7 @@ class Periodic:
 
 @dataclass(slots=True)
 class Parts:
-    """A stream cut from the arrays that an endless iterator yields; holds one of them at a time."""
+    """A stream cut from the arrays that an endless iterator yields; holds one array at a time."""
 
     parts: Iterator[FloatArray]
     _left: FloatArray
@@ -68,7 +68,7 @@ class Parts:
 
 
 def samples(seconds: float, rate: float, least: int, what: str) -> int:
-    """Whole samples in a period; raises BadInput if there are fewer than ``least`` or too many to keep."""
+    """Number of samples in a period; raises BadInput if there are fewer than ``least`` or too many to store."""
     count = round(seconds * rate)
     if not least <= count <= MAX_TABLE:
         raise BadInput(

@@ -1,6 +1,6 @@
-"""A designed experiment on a machine with its own limits: accepted only if it stays within them.
+"""A designed experiment on a machine with its own limits; it is accepted only if it stays within them.
 
-The document is that of ``xy-sysid next``: which axis, for how long, what drives it, the voltage and travel that it needs, and where it may begin.
+The document is that of ``xy-sysid next``: axis, duration, signal, the required voltage and travel, and the allowed start positions.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from xy_sysid.settings import AxisExcitation, ExcitationSettings, changed, unkno
 from xy_sysid.units import USUAL, Units
 
 KEYS = ("axis", "rate", "seconds", "ramp", "excitation", "needs", "units", "expects", "sets", "made_by")
-DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # settings that it may have
+DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # allowed settings
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
 
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What an experiment needs of its axis.
+    """The requirements of an experiment on its axis.
 
-    voltage: the largest input; travel: the places that it comes to, with margin, from where the axis stood (``start``) when it was designed
-    reach: the expected motion without margin, from where it begins; within: the ends that were given to the design
+    voltage: the largest input; travel: the expected positions, with margin, from the axis's position at design (``start``)
+    reach: the expected motion without margin, relative to its start; within: the ends of travel given to the design
     speed, acceleration: the largest expected, with margin
     """
 
@@ -38,12 +38,12 @@ class Needs:
     acceleration: float
 
     def starts(self, low: float = -math.inf, high: float = math.inf) -> tuple[float, float]:
-        """Between which places the axis has to stand, so that the expected motion stays within the ends of the design, and within two others."""
+        """(lowest, highest) start position, so that the expected motion stays within the design's ends and within low and high."""
         return max(low, self.within[0]) - self.reach[0], min(high, self.within[1]) - self.reach[1]
 
 
 class Taken(NamedTuple):
-    """An experiment that was taken over. settings: of the excitation; starts: by axis, between which places it has to stand when it begins."""
+    """An accepted experiment. settings: of the excitation; starts: by axis, lowest and highest start position."""
 
     settings: ExcitationSettings
     starts: dict[str, tuple[float, float]]
@@ -52,7 +52,7 @@ class Taken(NamedTuple):
 def with_experiment(settings: ExcitationSettings, document: object, where: str) -> Taken:
     """The settings of the excitation with a designed experiment on one axis; the other axes get their constant offset, which may hold a load.
 
-    Raises BadInput, in one line, for a document that is none, and for one that asks for more than the settings allow.
+    Raises BadInput, in one line, for an invalid document, and for one that exceeds the settings' limits.
     """
     told = _checked(document, where)
     axis = told["axis"]
@@ -95,20 +95,20 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
     made = changed(settings, {**values, "duration": told["seconds"]})
     drives = made.axes[axis]
     together = abs(drives.offset) + drives.slow + drives.rms * (drives.kind != "off")
-    if together > own.limit * (1.0 + 1e-9):  # the drive would cut it off, and the motion would be another one
+    if together > own.limit * (1.0 + 1e-9):  # the drive would clip it, and the motion would differ
         words = f"{together:.4g} {units.input} of offset, slow and rms together"
         raise BadInput(f"{where}: excitation of axis {axis}", words, f"up to its limit of {own.limit:g} {units.input}", AGAIN)
     return Taken(made, {axis: needs.starts(*inside)})
 
 
 def of_an_experiment(name: str) -> bool:
-    """Whether a setting of the excitation, such as x.rms, is one that an experiment changes."""
+    """True if an experiment changes this setting of the excitation, such as x.rms."""
     axis, _, own = name.rpartition(".")
     return own in DRIVES if axis else name in ("duration", "experiment")
 
 
 def _checked(document: object, where: str) -> Mapping[str, Any]:
-    """The experiment of a document, its numbers as numbers."""
+    """The experiment of a document, with numbers as floats."""
     if not isinstance(document, Mapping) or not isinstance(document.get("experiment"), Mapping):
         raise BadInput(where, "no experiment", "a file of xy-sysid next", "Make one: xy-sysid next REC -o next.yaml.")
     told = dict(document["experiment"])
@@ -148,11 +148,11 @@ def _number(value: object) -> bool:
 
 
 class Lasting(Protocol):
-    """What drives an axis, and for how many s."""
+    """A drive signal for an axis with a duration."""
 
     @property
     def excitation(self) -> AxisExcitation:
-        """Of the axis."""
+        """Settings of the axis's excitation."""
 
     @property
     def ramp(self) -> float:
@@ -164,7 +164,7 @@ class Lasting(Protocol):
 
 
 def document_of(axis: str, rate: float, experiment: Lasting, needs: Needs, units: Units = USUAL) -> dict[str, Any]:
-    """The document of an experiment. rate: Hz; units: in which its needs are."""
+    """The document of an experiment. rate: Hz; units: of its requirements."""
     values = experiment.excitation.model_dump()
     drives = {name: values[name] for name in DRIVES}
     return {

@@ -4,12 +4,12 @@ Time and positions are arguments. The order of the guards for every sample is
 
     (signal * rms + offset + centring) * ramp-in -> travel limits -> fade-out -> amplitude limit
 
-and what ``next`` returns is what comes out at the end. Until the first usable position it is 0 V. Efforts and velocities of
-ros2_control go the same way. A position is sent as
+``next`` returns the result. Until the first usable position it is 0 V. Efforts and velocities of
+ros2_control are handled in the same way. A position is sent as
 
-    where it stood at the start + limited(signal * rms + offset) * ramp-in -> fade-out to where it is -> inside the travel
+    position at the start + limited(signal * rms + offset) * ramp-in -> fade-out to the present position -> inside the travel
 
-and until the first usable position nothing is (NaN).
+and nothing is sent before the first usable position (NaN).
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings, knobs
 
 DriveState = Literal["idle", "active", "stopping", "stopped"]
-Starts = Mapping[str, tuple[float, float]]  # by axis, between which places it has to stand when it begins
+Starts = Mapping[str, tuple[float, float]]  # by axis, lowest and highest start position
 
 # Settings that may change while active; a new rms or offset is reached along a straight line over the next block.
 LIVE_AXIS = frozenset({"rms", "limit", "offset", "centring", "travel_min", "travel_max", "brake", "brake_voltage", "velocity_gain", "breakaway"})
 LIVE = frozenset({"duration", "watchdog", "abort_ramp", "patience"})
 
-STOP_RAMP = 0.1  # s in which STOP fades out at most, whatever abort_ramp is
-AHEAD = 1.0  # s by which a stamp may lie ahead of the commands; their thread may have been held up
-ABSURD = 10.0  # a position so many travel ranges away from the middle is a broken encoder, not a place
+STOP_RAMP = 0.1  # maximum s of the fade-out at STOP, for any abort_ramp
+AHEAD = 1.0  # s by which a stamp may be ahead of the commands; their thread may have been delayed
+ABSURD = 10.0  # a position further than this many travel ranges from the middle is an encoder fault
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What the drive did since the last report.
+    """The drive's activity since the last report.
 
-    rms: (axes,) of the voltage applied, V; clipped, braked: (axes,) samples changed by the amplitude limit and by the
+    rms: (axes,) of the applied voltage, V; clipped, braked: (axes,) samples changed by the amplitude limit and by the
     travel limits since the start
     """
 
@@ -60,8 +60,8 @@ class Report:
 class Drive:
     """The voltage of all axes, block by block.
 
-    settings: what to apply; seq: counter of the first sample; watched: stop when motion and voltage do not fit (a recording of a
-    simulated machine goes on); starts: where an experiment may begin. Raises BadInput if a signal does not fit the rate.
+    settings: what to apply; seq: counter of the first sample; watched: stop if motion and voltage do not match (False for
+    recordings of a simulated machine); starts: allowed start positions of an experiment. Raises BadInput if a signal does not fit the rate.
     """
 
     def __init__(self, settings: ExcitationSettings, seq: int = 0, watched: bool = True, starts: Starts | None = None) -> None:
@@ -71,7 +71,7 @@ class Drive:
         self._watched = watched
         self.state: DriveState = "idle"
         self.reason = ""
-        self.blind = False  # stopped because positions did not come
+        self.blind = False  # stopped because of missing positions
         self.fault = False  # stopped by a guard
         self.seq = seq
         check_loop(settings)
@@ -83,8 +83,8 @@ class Drive:
         self._begun = 0  # samples since the first usable position
         self._fade_from, self._fade_at, self._fade_length = 1.0, 0, 0
         self._start: FloatArray | None = None
-        self._last: FloatArray | None = None  # what was sent last
-        self._rest: FloatArray | None = None  # position at which it was told to stop
+        self._last: FloatArray | None = None  # the newest sent values
+        self._rest: FloatArray | None = None  # position at the stop
         self._silence, self._unusable, self._why = 0.0, 0, ""
         self._seen_time = -np.inf
         self._ticked: float | None = None
@@ -104,12 +104,12 @@ class Drive:
         return np.array([getattr(axis, name) for axis in self.settings.axes.values()], dtype=np.float64)
 
     def start(self) -> None:
-        """From idle to active; the ramp-in begins with the first usable position."""
+        """Switch from idle to active; the ramp-in starts with the first usable position."""
         if self.state == "idle":
             self.state = "active"
 
     def stop(self, reason: str, seconds: float) -> None:
-        """Fade out over so many seconds and say why; a stop that is over sooner than the one under way replaces it."""
+        """Fade out within this many seconds and store the reason; a stop that ends sooner than the current one replaces it."""
         if self.state == "idle":
             self.state, self.reason = "stopped", reason
         if self.state not in ("active", "stopping"):
@@ -127,7 +127,7 @@ class Drive:
         self.stop("STOP", min(self.settings.abort_ramp, STOP_RAMP))
 
     def _level(self, at: int) -> float:
-        """Part of the voltage left after so many samples of fading out."""
+        """Fraction of the voltage after this many samples of fading out."""
         if self.state != "stopping":
             return 1.0
         if at >= self._fade_length:
@@ -135,7 +135,7 @@ class Drive:
         return self._fade_from * 0.5 * (1 + float(np.cos(np.pi * at / self._fade_length)))
 
     def change(self, settings: ExcitationSettings) -> None:
-        """Use new settings from the next block on; raises BadInput for one that cannot change while active."""
+        """Use new settings from the next block on; raises BadInput for a setting that cannot change while active."""
         if self.state in ("active", "stopping"):
             before = {item.name: item.value for item in knobs(self.settings)}
             for item in knobs(settings):
@@ -147,11 +147,11 @@ class Drive:
         self._use(settings)
 
     def see(self, block: Block, overdue: int = 0) -> bool:
-        """Take note of positions, (n, axes) in m; False if they are not usable, and ``unusable`` says why.
+        """Read positions, (n, axes) in m; returns False if they are not usable (``unusable`` gives the reason).
 
-        overdue: samples that were due and are not sent yet, as this computer stood still; a position may be of any time since then
+        overdue: samples that are due but not sent yet because this computer was delayed; a position may be from any time since then
 
-        A motion that the voltage cannot have caused, or that it should have, stops the drive.
+        The drive stops on motion that the voltage cannot have caused, and on missing motion.
         """
         why = self._why_unusable(block, overdue)
         if why:
@@ -177,7 +177,7 @@ class Drive:
         return True
 
     def _check_start(self, place: FloatArray) -> None:
-        """Stop before anything moves where an experiment was designed to begin at other places."""
+        """Stop before any motion if the axis is outside the start positions of the experiment."""
         low, high = self._starts.T
         outside = (place < low) | (place > high)
         if outside.any():
@@ -187,7 +187,7 @@ class Drive:
             self.stop(f"{self.axes[axis]} stands at {place[axis]:.6g} {unit}, and {designed}. Move it there, or design it again", 0.0)
 
     def _wrong(self, seq: FloatArray, values: FloatArray) -> str:
-        """What the motion shows to be wrong, or nothing."""
+        """The fault that the motion shows, or an empty text."""
         backwards = [] if self.settings.holds else self._sign.saw(seq, values, self._noise)
         if backwards:
             what = "voltage" if self.settings.output == "blocks" else self.settings.interface
@@ -196,7 +196,7 @@ class Drive:
 
     @property
     def unusable(self) -> str:
-        """What was wrong with the last position that was not usable."""
+        """The fault of the last unusable position."""
         return self._why
 
     def _why_unusable(self, block: Block, overdue: int) -> str:
@@ -227,7 +227,7 @@ class Drive:
         return ""
 
     def _speed(self, values: FloatArray, seq: FloatArray) -> FloatArray:
-        """(axes,) m/s over the block, or since the last position if it has one row; 0 if neither tells, or noise explains it."""
+        """(axes,) m/s over the block, or since the last position for a single row; 0 if it is unknown or within the noise."""
         first, at = values[0], float(seq[0])
         if len(seq) == 1 and self._travel.seen is not None:
             first, at = self._travel.seen.position, self._travel.seen.seq
@@ -238,14 +238,14 @@ class Drive:
 
     @property
     def answered(self) -> bool:
-        """A usable position has come since it began."""
+        """True if a usable position has arrived since the start."""
         return self._start is not None
 
     def tick(self, now: float) -> None:
-        """Look at the clock, s: without a usable position for too long, fade out.
+        """Check the clock, s: fade out after too long a time without a usable position.
 
-        A pause of the caller itself counts as a quarter of the time allowed at most, so that positions that wait to be
-        read are read before they are missed.
+        A pause of the caller counts as at most a quarter of the allowed time, so that waiting positions are read before
+        they are reported as missing.
         """
         waiting = self._start is None or self.settings.lockstep
         allowed = self.settings.patience if waiting else self.settings.watchdog
@@ -263,7 +263,7 @@ class Drive:
             self.stop(reason, self.settings.abort_ramp)
 
     def skip(self, n: int) -> None:
-        """Let n samples of time pass without a voltage, after a stall of the caller; a controller keeps to the last command."""
+        """Let n samples of time pass without a voltage, after a delay of the caller; a controller holds the last command."""
         if n > 0 and self.settings.output == "commands" and self._last is not None:
             self._travel.sent(self.seq, np.tile(self._last, (n, 1)))
             self._motion.sent(self.seq, np.tile(self._last, (n, 1)))
@@ -275,20 +275,20 @@ class Drive:
                 stream.next(n)
 
     def catch_up(self, missed: int) -> Block:
-        """The next sample, after the given number of skipped ones; all samples that the controller has executed since the last call, if known."""
+        """The next sample after ``missed`` skipped ones. The block has all samples executed by the controller since the last call, if known."""
         self.skip(missed)
         return self.next(1)
 
     @property
     def stopping_time(self) -> float:
-        """s that fading out takes at most."""
+        """Maximum s of the fade-out."""
         return self.settings.abort_ramp
 
     def _running(self) -> bool:
         return self.state in ("active", "stopping") and self._start is not None
 
     def next(self, n: int) -> Block:
-        """The following n samples of voltage, (n, axes) in V, exactly as they are to be applied."""
+        """The following n samples of voltage, (n, axes) in V, exactly as applied."""
         if self._running() and self.state == "active" and 0 < self.settings.duration <= self._begun / self.settings.rate:
             self.stop(f"the duration of {self.settings.duration:g} s is over", self.settings.ramp)
         values = (self._reference(n) if self.settings.holds else self._voltage(n)) if self._running() else np.tile(self.safe, (n, 1))
@@ -306,14 +306,14 @@ class Drive:
         return Block(block.axes, block.seq, block.time, values)
 
     def zeros(self, n: int) -> Block:
-        """The following n samples of what is safe, whatever state this is in."""
+        """The following n samples of the safe output, in any state."""
         seq = np.arange(self.seq, self.seq + n, dtype=np.float64)
         self.seq += n
         return Block(self.axes, seq, seq / self.settings.rate, np.tile(self.safe, (n, 1)))
 
     @property
     def safe(self) -> FloatArray:
-        """(axes,) 0, or where positions are sent, the one measured last, or when it was stopped; NaN before there is one."""
+        """(axes,) 0; where positions are sent, the newest measured one, or the one at the stop; NaN before the first."""
         if not self.settings.holds:
             return np.zeros(len(self.axes))
         if self._rest is not None or self._travel.seen is None:
@@ -321,7 +321,7 @@ class Drive:
         return self._travel.seen.position
 
     def _reference(self, n: int) -> FloatArray:
-        """(n, axes) positions to be held: about where it stood at the start, and where it is once it has stopped."""
+        """(n, axes) positions to hold: near the start position, and the present one after a stop."""
         assert self._start is not None
         wanted = np.clip(self._driven(n)[0], -self._limit, self._limit)
         self._clipped += np.sum(np.abs(wanted) == self._limit, axis=0)
@@ -336,7 +336,7 @@ class Drive:
         return np.asarray(kept)
 
     def _driven(self, n: int) -> tuple[FloatArray, FloatArray]:
-        """(n, axes) signal, slow sine and offset, and the same with centring; both faded in."""
+        """(n, axes) signal, slow sine and offset, and the same with centring; both with ramp-in."""
         driven = np.column_stack([stream.next(n) for stream in self._signals]) * _line(self._gain, self._rms, n)
         driven += _line(self._offset, self._steady, n)
         self._gain, self._offset = self._rms, self._steady
@@ -353,7 +353,7 @@ class Drive:
         return driven, centred
 
     def _away(self) -> FloatArray:
-        """(axes,) from where it is back to where it stood at the start."""
+        """(axes,) distance from the present position back to the start position."""
         assert self._travel.seen is not None and self._start is not None
         return self._start - self._travel.seen.position
 
@@ -371,7 +371,7 @@ class Drive:
         return applied
 
     def report(self) -> Report:
-        """What was applied since the last report."""
+        """The applied voltage since the last report."""
         rms = np.sqrt(self._squares / max(1, self._counted))
         self._squares, self._counted = np.zeros(len(self.axes)), 0
         return Report(state=self.state, reason=self.reason, rms=rms, clipped=self._clipped.copy(), braked=self._braked.copy())

@@ -1,4 +1,4 @@
-"""The readings of an encoder at rest: noise, and a toggling last count. Only larger changes are motion."""
+"""Noise and count toggling of an encoder at rest. Only larger changes are motion."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import scipy
 
 from xy_sysid.samples.block import FloatArray
 
-COUNTS, SIGMAS = 2.0, 9.0  # encoder counts, and standard deviations, by which two readings differ without motion: once in months of readings
+COUNTS, SIGMAS = 2.0, 9.0  # encoder counts, and standard deviations, by which two readings may differ without motion: once in months of readings
 MEMORY = 2000  # readings over which the noise is averaged
 BENT = 6.0  # variance of a second difference of white noise of variance 1
 THIRD = 20.0  # variance of a third difference
-WORTH = 0.433  # independent squares in each of these: neighbours share readings (correlations of -0.75, 0.3 and -0.05)
-RISK = 1e-3  # probability that few readings tell less noise than there is; SIGMAS leave room for the rest
+WORTH = 0.433  # independent squares per difference: neighbours share readings (correlations of -0.75, 0.3 and -0.05)
+RISK = 1e-3  # probability that few readings underestimate the noise; SIGMAS cover the rest
 
 
 class EncoderNoise:
-    """Learns from readings; ``still`` is the distance that needs no motion.
+    """Estimates the noise from readings; ``still`` is the largest distance that needs no motion.
 
-    Noise is measured by third differences of consecutive readings: motion of steady speed or acceleration has none, and a jerk can only
-    make the noise look larger. Few readings may tell too little: ``still`` counts on the upper limit of the variance that they leave possible.
+    Noise is measured with third differences of consecutive readings: constant speed or acceleration has none, and a jerk can only
+    increase the estimate. A few readings may underestimate the noise; therefore ``still`` uses the upper confidence limit of the variance.
     """
 
     def __init__(self, axes: int) -> None:
@@ -29,10 +29,10 @@ class EncoderNoise:
         self.variance = np.zeros(axes)  # m^2 of one reading
         self._readings = 0
         self._last = np.empty((0, axes))
-        self.still = np.zeros(axes)  # m by which two readings differ at most while the axis rests
+        self.still = np.zeros(axes)  # m, largest difference of two readings at rest
 
     def saw(self, values: FloatArray) -> None:
-        """Consecutive positions, (n, axes) in m."""
+        """Add consecutive positions, (n, axes) in m."""
         rows = np.concatenate((self._last, values))
         steps = np.abs(np.diff(rows, axis=0))
         if len(steps):
@@ -48,12 +48,12 @@ class EncoderNoise:
     def _resting(self) -> FloatArray:
         squares = WORTH * self._readings
         if not squares:
-            return np.full(len(self.count), np.inf if len(self._last) > 1 else 0.0)  # not known yet
+            return np.full(len(self.count), np.inf if len(self._last) > 1 else 0.0)  # unknown so far
         sigma = np.sqrt(self.variance * max(squares / max(_least(squares), 1e-300), 1.0))
         return np.asarray(COUNTS * np.where(np.isfinite(self.count), self.count, 0.0) + SIGMAS * sigma)
 
 
 @lru_cache(maxsize=MEMORY)
 def _least(squares: float) -> float:
-    """What a sum of so many squares falls below with the probability RISK (chi-squared)."""
+    """The value below which a sum of this many squares falls with probability RISK (chi-squared)."""
     return 2.0 * float(scipy.special.gammaincinv(squares / 2.0, RISK))

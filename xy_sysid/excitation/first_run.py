@@ -1,7 +1,7 @@
-"""The first motion of an unknown machine: one axis at a time, a push forth and back at each of many small voltages.
+"""The first motion of an unknown machine: one axis at a time, a push forth and back at increasing small voltages.
 
-After each push the answer is looked at before a louder one is asked for: did this axis move, and no other; plus to plus; as far as
-a machine of this travel may; was it still before; is there room for the next. The first problem ends it.
+After each push the response is checked before the voltage is increased: this axis moved and no other; the sign is right; the motion is
+plausible for the travel; it was at rest before; there is room for the next push. The first problem ends the run.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from xy_sysid.settings import ExcitationSettings
 from xy_sysid.units import bare
 from xy_sysid.units import moved as in_words
 
-FIRST, GROWS = 0.005, 1.6  # the first push as part of the limit, and how much louder the next one is
-LOUDEST = 2.0  # times rms, the last push
-COUNTS, SIGMAS = 6.0, 6.0  # encoder counts, and standard deviations at rest, that are motion
-LARGE, SMALL = 30.0, 0.01  # times the speed per volt that travel and full voltage suggest: beyond, the unit is wrong
-CLEAR = 0.2  # of the furthest push, what another must reach to count for gain and friction: less is the give of a contact that sticks
-NEXT = 1.5  # the next push may go so many times further than in proportion
-SLOWEST = 0.1  # s of delay and lag; the travel limits look no further ahead
-HALF = 0.5  # part of the push at which voltage counts as on
-RETURNS = 0.2  # part of a push that a contact which sticks gives back at 0 V; less is an axis that stays where it was moved
+FIRST, GROWS = 0.005, 1.6  # the first push as a fraction of the limit, and the factor from one push to the next
+LOUDEST = 2.0  # the last push as a multiple of rms
+COUNTS, SIGMAS = 6.0, 6.0  # encoder counts, and standard deviations at rest, from which a change is motion
+LARGE, SMALL = 30.0, 0.01  # times the speed per volt expected from travel and full voltage: outside this range the unit is wrong
+CLEAR = 0.2  # of the longest push; a push must reach this to count for gain and friction: a smaller motion is elastic presliding
+NEXT = 1.5  # the next push may go this much further than in proportion
+SLOWEST = 0.1  # s of delay and lag; the travel limits look this far ahead
+HALF = 0.5  # of the push, at which the voltage counts as on
+RETURNS = 0.2  # of a push, elastic return at 0 V; with less, the axis stays where it was moved
 LOADED = "a load drives it (it hangs or tips over), so the wiring cannot be checked. Hold or balance the load, and start again"
 BY_HAND = "Switch the drive off and push it by hand: if it moves on by itself, hold or balance the load; if it stays where it is left, "
 SWAP = "swap the motor's wires or the encoder's sign"
@@ -32,7 +32,7 @@ SWAP = "swap the motor's wires or the encoder's sign"
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """What is to be done next: an axis, and V forth and back."""
+    """The next push: an axis, and V forth and back."""
 
     axis: str
     volts: float
@@ -40,7 +40,7 @@ class Push:
 
 @dataclass(frozen=True, slots=True)
 class PushResult:
-    """What one push showed. moved: m forth and m back; sentence: for people; problem: why it must end, or nothing."""
+    """The result of a push. moved: m forth and m back; sentence: for the user; problem: why the run must end, or empty."""
 
     push: Push
     moved: tuple[float, float]
@@ -50,8 +50,8 @@ class PushResult:
 
 @dataclass(frozen=True, slots=True)
 class AxisFound:
-    """What is known of an axis: speed per volt (m/s/V), friction (V), greatest voltage that left it at rest and least that
-    moved it (V), delay and lag together (s), noise at rest (m); None where it did not show.
+    """The results for an axis: speed per volt (m/s/V), friction (V), greatest voltage without motion and least with
+    motion (V), delay and lag together (s), noise at rest (m); None where unknown.
     """
 
     velocity_gain: float | None
@@ -64,7 +64,7 @@ class AxisFound:
 
 @dataclass(slots=True)
 class _Seen:
-    """Of one axis: V s and s of the pushes that moved it, and how far they did, m."""
+    """Sums for one axis: V s and s of the pushes that moved it, and their distance, m."""
 
     still: float = 0.0
     moves: float | None = None
@@ -74,7 +74,7 @@ class _Seen:
 
 
 class FirstRun:
-    """``next`` says what to do, ``took`` what came of it; the caller drives the machine."""
+    """``next`` returns the next push, ``took`` reads its result; the caller drives the machine."""
 
     def __init__(self, settings: ExcitationSettings) -> None:
         self.settings = settings
@@ -93,11 +93,11 @@ class FirstRun:
         return [*(FIRST * wanted.limit * GROWS**k for k in range(count)), top] if top > 0 else []
 
     def next(self) -> Push | None:
-        """The next push, or None when all is known or a problem was found."""
+        """The next push, or None when the run is complete or a problem was found."""
         return None if self.problem or not self._plan else self._plan[0]
 
     def took(self, voltage: FloatArray, position: FloatArray) -> PushResult:
-        """The samples of a push from rest to rest, (n, axes) V and m, as they were published."""
+        """Read the samples of a push from rest to rest, (n, axes) V and m, as published."""
         push, rate = self._plan.pop(0), self.settings.rate
         column = self.axes.index(push.axis)
         seen, volts, place = self._seen[push.axis], voltage[:, column], position[:, column]
@@ -141,7 +141,7 @@ class FirstRun:
         return self._moved(push, moved, (volts[:turn] / rate, place[:turn] - rest[:, column].mean()))
 
     def _moved(self, push: Push, moved: tuple[float, float], forth: tuple[FloatArray, FloatArray]) -> PushResult:
-        """It moved the right way: how far for what, how late, and is there room for more."""
+        """It moved in the right direction: evaluate gain and delay, and whether there is room for more."""
         column, rate = self.axes.index(push.axis), self.settings.rate
         seen, sums = self._seen[push.axis], np.cumsum(forth[0])
         seen.moves = push.volts if seen.moves is None else seen.moves
@@ -177,7 +177,7 @@ class FirstRun:
         return PushResult(push, moved, self.problem, problem)
 
     def found(self, axis: str) -> AxisFound:
-        """What is known of an axis so far."""
+        """The results for an axis so far."""
         seen = self._seen[axis]
         gain = friction = None
         clear = [push for push in seen.pushed if push[2] > CLEAR * max(one[2] for one in seen.pushed)]
@@ -190,7 +190,7 @@ class FirstRun:
         return AxisFound(velocity_gain=gain, friction=friction, still=seen.still, moves=seen.moves, lag=seen.lag, noise=seen.noise)
 
     def summary(self, axis: str) -> str:
-        """The same in a sentence, with what to write into the run file."""
+        """The results in a sentence, with the lines for the run file."""
         found = self.found(axis)
         if found.velocity_gain is None or found.moves is None:
             return f"{axis}: did not move up to {found.still:.3g} V: raise rms, or look at brake and friction"
@@ -203,7 +203,7 @@ class FirstRun:
 
 
 def _answers(place: FloatArray, begin: int, turn: tuple[int, int]) -> tuple[float, float]:
-    """m by which a push forth, from ``begin``, and one back have changed the motion that was there before each.
+    """m by which a push forth, which starts at ``begin``, and one back have changed the motion that was present before each.
 
     turn: last sample of the push forth, and first of the push back; the second half of the rest between them shows the motion there
     """
@@ -215,7 +215,7 @@ def _answers(place: FloatArray, begin: int, turn: tuple[int, int]) -> tuple[floa
 
 
 def _which_way(answer: tuple[float, float], least: float) -> str:
-    """What is wrong with the direction, or nothing; answer: m by which a push forth and one back have changed the motion."""
+    """The problem with the direction, or empty; answer: m by which a push forth and one back have changed the motion."""
     forth, back = answer
     if forth < -least and back > least:
         return f"plus volts move it to minus, and minus volts to plus: {SWAP}"

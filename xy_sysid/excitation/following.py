@@ -1,7 +1,7 @@
-"""Does a joint follow the position that its controller is told? If not, the controller does not listen, or something holds the joint.
+"""Does a joint follow the commanded position? If not, the controller does not respond, or the joint is blocked.
 
-off the way     further from where the reference was lately than the brake zone
-no answer       the reference moves by a good part of its limit and the encoder shows one and the same number
+off the way     further from the recent references than the brake zone
+no answer       the reference moves by a large part of its limit and the encoder reading is constant
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ import numpy as np
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import ExcitationSettings
 
-MEMORY = 1.0  # s of reference and motion that are looked at
-MOVES = 0.25  # part of the limit by which the reference must have moved before standing still says anything
+MEMORY = 1.0  # s of reference and motion that are kept
+MOVES = 0.25  # of the limit: a smaller motion of the reference is not judged
 
 
 class FollowCheck:
-    """``sent`` and ``saw`` in the order in which they happen; ``saw`` says why to stop, or nothing."""
+    """Call ``sent`` and ``saw`` in the order of events; ``saw`` returns the reason to stop, or an empty text."""
 
     def __init__(self, settings: ExcitationSettings) -> None:
         self.axes = tuple(settings.axes)
-        self._sent: deque[tuple[float, FloatArray, FloatArray]] = deque()  # last counter, least and greatest reference, (axes,) each
+        self._sent: deque[tuple[float, FloatArray, FloatArray]] = deque()  # last counter, minimum and maximum reference, (axes,) each
         self._seen: deque[tuple[float, FloatArray]] = deque()
         self.use(settings)
 
@@ -33,13 +33,13 @@ class FollowCheck:
         self._limit, self._zone = np.array([a.limit for a in axes]), np.array([a.brake for a in axes])
 
     def sent(self, seq: float, values: FloatArray) -> None:
-        """References, (n, axes), whose first sample has this counter."""
+        """Store references, (n, axes); seq is the counter of the first."""
         self._sent.append((seq + len(values) - 1, values.min(axis=0), values.max(axis=0)))
         while self._sent[0][0] < self._sent[-1][0] - MEMORY * self.rate:
             self._sent.popleft()
 
     def saw(self, seq: FloatArray, values: FloatArray) -> str:
-        """Positions, (n, axes), with their counters; why driving must end, or nothing."""
+        """Check positions, (n, axes), with their counters; returns the reason to stop, or an empty text."""
         self._seen.append((float(seq[-1]), values[-1]))
         while self._seen[0][0] < self._seen[-1][0] - MEMORY * self.rate:
             self._seen.popleft()

@@ -1,4 +1,4 @@
-"""Excitation and machine in lockstep, without ROS and without a clock: each block is made with the positions of an earlier one."""
+"""Excitation and machine in lockstep, without ROS and without a clock: each block uses the positions of an earlier one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import ExcitationSettings
 
-OFTEN = 200  # blocks from one word on progress to the next
+OFTEN = 200  # blocks between two progress reports
 
 
 class Machine(Protocol):
@@ -27,9 +27,9 @@ class Machine(Protocol):
 
 
 def drive(machine: Machine, settings: ExcitationSettings, duration: float, tell: Callable[[float], None] = lambda seconds: None) -> Recording:
-    """What the machine answers to ``duration`` s of excitation; block k is made with the positions of block k - ahead.
+    """The recording of ``duration`` s of excitation; block k uses the positions of block k - ahead.
 
-    tell: called now and then with the seconds that are done
+    tell: called regularly with the seconds that are done
     """
     driver = Drive(settings, watched=False)
     total = round(duration * settings.rate)

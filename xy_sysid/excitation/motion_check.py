@@ -1,18 +1,18 @@
-"""Does the motion of each axis fit its voltage? If not, encoder, wiring or settings are wrong, and the drive must stop.
+"""Does the motion of each axis match its voltage? If not, encoder, wiring or settings are wrong, and the drive must stop.
 
-One principle: what the voltage could have moved is reckoned alongside, from the volt seconds beyond ``breakaway`` and the speed
-per volt, and compared with what the encoder shows. An encoder may show nothing only as long as nothing can have gone far
-(STRIDE of a brake zone); so friction and dead zones up to ``breakaway``, and low voltage at rest, are no faults.
+One principle: the possible motion is calculated from the volt seconds beyond ``breakaway`` and the speed
+per volt, and compared with the encoder. A constant encoder reading is accepted only while the axis cannot have moved far
+(STRIDE of a brake zone). Therefore friction and dead zones up to ``breakaway``, and low voltage at rest, are no faults.
 
     a step          faster than FASTEST times what the voltage limit gives: the encoder leaps, or its scale is wrong
-    no answer       a reckoned stride, and the encoder stands still, or has never shown LEAST of it, or of what varied: frozen, or a wrong scale
-    the wrong way   slow motion that goes against the voltage: a sign is wrong
+    no answer       a stride was possible, and the encoder is constant or has never shown LEAST of it: frozen, or a wrong scale
+    the wrong way   slow motion against the voltage: a sign is wrong
     outside         beyond a limit and not coming back, or not slowed by full inward voltage
 
-The speed per volt is the setting ``velocity_gain``; unknown, full voltage is taken to cross the travel in CROSSING seconds,
-until the motion has shown it.
+The speed per volt is the setting ``velocity_gain``. If it is unknown, full voltage is assumed to cross the travel in CROSSING seconds,
+until the motion has shown the real value.
 
-The numbers were tried on the machines of config/machines, with and without another effect, quiet to loud, on most
+The numbers were tested on the machines of config/machines, with and without another effect, at low to high amplitude, with most
 kinds of signal.
 """
 
@@ -25,37 +25,37 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import over
 
-REACTION = 0.006  # s that a machine takes to answer a voltage: 1.3 ms delay and 4 ms lag of a ball-screw axis
-CROSSING = 0.3  # s in which an axis of unknown gain is taken to cross its travel at full voltage: its limit, and FULL at least
-FULL = 10.0  # V; a lower limit is taken for caution, and not for a drive of less voltage
-FASTEST = 10.0  # times that speed is more than any motion
-MEMORY = 1.0  # s of motion that is looked at
-SHORT = 0.4  # s in which a wrong sign of lively motion shows
-STRIDE = 0.5  # part of the brake zone that may be gone unseen
-LEAST = 0.003  # part of a stride that an encoder shows at least; a scale that is 1000 times too small stays below
-EVERY = 0.05  # s between two looks at the sign
-SMOOTH = 0.1  # s over which slow motion is averaged: resonances turn the sign of what is faster
-LIVELY = 0.1  # part of the brake zone that slow motion must reach before its sign is judged
-LEADS = 2.0  # times what motion shares with the sum of the voltage is more than what it shares with the voltage, and than the rest
-SHARE = 0.05  # part of the reckoned motion below which its sign says nothing
-RETURN = 0.5  # s beyond a limit in which an axis must have begun to come back
-PROGRESS = 0.02  # of the brake zone, what coming back is at least
-SLOWING = 0.03  # s over which outward motion under full inward voltage must become slower
+REACTION = 0.006  # s of response time of a machine: 1.3 ms delay and 4 ms lag of a ball-screw axis
+CROSSING = 0.3  # s in which an axis of unknown gain is assumed to cross its travel at full voltage (its limit, at least FULL)
+FULL = 10.0  # V; a lower limit is taken as caution, not as a drive of lower voltage
+FASTEST = 10.0  # times that speed: no motion is faster
+MEMORY = 1.0  # s of motion that are kept
+SHORT = 0.4  # s in which a wrong sign shows in fast motion
+STRIDE = 0.5  # of the brake zone, distance that may be travelled without an encoder change
+LEAST = 0.003  # of a stride, least motion of the encoder; a scale that is 1000 times too small stays below
+EVERY = 0.05  # s between two checks of the sign
+SMOOTH = 0.1  # s over which slow motion is averaged; above resonances the sign of faster motion is reversed
+LIVELY = 0.1  # of the brake zone, slow motion from which its sign is judged
+LEADS = 2.0  # factor by which correlation with the integrated voltage must exceed that with the voltage, and the residual
+SHARE = 0.05  # of the calculated motion; below this the sign is not judged
+RETURN = 0.5  # s beyond a limit within which an axis must start to return
+PROGRESS = 0.02  # of the brake zone, least motion of a returning axis
+SLOWING = 0.03  # s within which outward motion under full inward voltage must slow down
 BY_HAND = (
     "Switch the drive off and move it back by hand: if it moves off by itself, hold or balance the load; "
     "if it stays where it is left, run --first tells whether plus is plus"
 )
-STEADY = 0.5  # greatest centring * speed per volt * age of a position; above 1.57 the loop swings by itself
+STEADY = 0.5  # largest centring * speed per volt * age of a position; above 1.57 the loop is unstable
 
 
 def full(settings: ExcitationSettings) -> FloatArray:
-    """(axes,) V that the machine is made for, at least; of a command only the limit is known."""
+    """(axes,) V, the machine's full voltage, at least; for other commands only the limit is known."""
     least = FULL if settings.output == "blocks" else 0.0
     return np.array([max(a.limit, least) for a in settings.axes.values()], dtype=np.float64)
 
 
 def gains(settings: ExcitationSettings) -> FloatArray:
-    """(axes,) m/s/V: what is known, 1 of a velocity that is commanded, or that full voltage crosses the travel in CROSSING."""
+    """(axes,) m/s/V: the setting, 1 for a velocity command, or the value for which full voltage crosses the travel in CROSSING."""
     travels = np.array([a.travel_max - a.travel_min for a in settings.axes.values()], dtype=np.float64)
     usual = np.ones(len(travels)) if settings.output == "commands" and settings.interface == "velocity" else travels / (full(settings) * CROSSING)
     known = np.array([a.velocity_gain for a in settings.axes.values()], dtype=np.float64)
@@ -63,25 +63,25 @@ def gains(settings: ExcitationSettings) -> FloatArray:
 
 
 def reaction(settings: ExcitationSettings) -> float:
-    """s that a machine takes to answer; a controller of ros2_control reads the command one period later and shows it one after."""
+    """s of response time; a controller of ros2_control reads the command one period later and reports one period after that."""
     return REACTION + (2.0 / settings.rate if settings.output == "commands" else 0.0)
 
 
 def age(settings: ExcitationSettings) -> float:
-    """s that a position is old when the voltage that it has made acts, at worst."""
+    """s, worst-case age of a position when the resulting voltage acts."""
     blocks = (settings.ahead if settings.lockstep else 1) + 1
     return blocks * settings.step / settings.rate + reaction(settings)
 
 
 def most_centring(settings: ExcitationSettings) -> FloatArray:
-    """(axes,) V/m beyond which the axis would swing, as far as it is known; inf where positions are sent, which nothing pulls."""
+    """(axes,) V/m above which the loop would oscillate, if known; inf where positions are sent, which have no centring."""
     if settings.holds:
         return np.full(len(settings.axes), np.inf)
     return np.asarray(STEADY / (gains(settings) * age(settings)))
 
 
 def check_loop(settings: ExcitationSettings) -> None:
-    """Raises BadInput if the centring would make an axis swing, as far as it is known."""
+    """Raises BadInput if the centring would make an axis oscillate, as far as that is known."""
     for (name, axis), gain, most in zip(settings.axes.items(), gains(settings), most_centring(settings), strict=True):
         if axis.centring > most:
             sent, unit = settings.units
@@ -97,26 +97,26 @@ def check_loop(settings: ExcitationSettings) -> None:
 
 
 class MotionCheck:
-    """``sent`` and ``saw`` in the order in which they happen; ``saw`` says why to stop, or nothing."""
+    """Call ``sent`` and ``saw`` in the order of events; ``saw`` returns the reason to stop, or an empty text."""
 
     def __init__(self, settings: ExcitationSettings) -> None:
         self.axes = tuple(settings.axes)
-        self._learnt = np.full(len(self.axes), np.nan)  # m/s/V that the motion has shown
+        self._learnt = np.full(len(self.axes), np.nan)  # m/s/V estimated from the motion
         self._count = np.full(len(self.axes), np.inf)  # m, the smallest change of the encoder so far
         self._total = np.zeros(len(self.axes))
         none = np.empty((0, len(self.axes)))
         self._ends, self._sums, self._means = np.empty(0), none, none  # of voltage: counter, V s beyond breakaway so far, V until here
         self._seqs, self._places, self._could = np.empty(0), none, none  # of motion: counter, m, V s that act there
         unknown = np.full((2, len(self.axes)), np.nan)
-        self._ever = unknown  # m, least and greatest place of all
-        self._rest, self._since = unknown, unknown  # m and V s, least and greatest since the encoder last moved
-        self._outside = np.full(len(self.axes), np.nan)  # counter since which an axis is beyond a limit without coming back
+        self._ever = unknown  # m, minimum and maximum position since the start
+        self._rest, self._since = unknown, unknown  # m and V s, minimum and maximum since the encoder last changed
+        self._outside = np.full(len(self.axes), np.nan)  # counter since which an axis is beyond a limit without returning
         self._outermost = np.zeros(len(self.axes))
-        self._judged = -np.inf  # counter at which the sign was looked at
+        self._judged = -np.inf  # counter of the last check of the sign
         self.use(settings)
 
     def use(self, settings: ExcitationSettings) -> None:
-        """Take limits and what is known of the machine from the settings."""
+        """Take limits and machine properties from the settings."""
         axes: list[AxisExcitation] = list(settings.axes.values())
         self.rate = settings.rate
         self._gain = gains(settings)
@@ -132,11 +132,11 @@ class MotionCheck:
 
     @property
     def gain(self) -> FloatArray:
-        """(axes,) m/s/V as the motion has shown it, or as it was given."""
+        """(axes,) m/s/V, estimated from the motion or given."""
         return np.where(np.isfinite(self._learnt), self._learnt, self._gain)
 
     def sent(self, seq: float, values: FloatArray) -> None:
-        """Voltage, (n, axes) in V, whose first sample has this counter."""
+        """Store voltage, (n, axes) in V; seq is the counter of its first sample."""
         beyond = np.sign(values) * np.maximum(np.abs(values) - self._idle, 0.0)
         before, self._total = self._total, self._total + beyond.sum(axis=0) / self.rate
         first = int(np.searchsorted(self._ends, seq - 2 * MEMORY * self.rate))
@@ -145,7 +145,7 @@ class MotionCheck:
         self._means = np.concatenate((self._means[first:], (np.zeros(len(self.axes)), values.mean(axis=0))))
 
     def saw(self, seq: FloatArray, values: FloatArray) -> str:
-        """Positions, (n, axes) in m, with their counters; why driving must end, or nothing."""
+        """Check positions, (n, axes) in m, with their counters; returns the reason to stop, or an empty text."""
         reason = self._step(seq, values)
         if reason or not self._ends.size:
             return reason
@@ -165,7 +165,7 @@ class MotionCheck:
         return reason
 
     def _step(self, seq: FloatArray, values: FloatArray) -> str:
-        """A motion between two samples that is faster than any."""
+        """Fault: a motion between two samples that is impossibly fast."""
         if self._seqs.size:
             later = seq > self._seqs[-1]
             seq, values = seq[later], values[later]
@@ -186,7 +186,7 @@ class MotionCheck:
         )
 
     def _stands(self, place: FloatArray, could: FloatArray) -> str:
-        """Since the encoder last moved, however long ago, much could have moved: slow voltage creeps as far as loud voltage runs."""
+        """Fault: a large motion was possible since the encoder last changed. Low voltage for long counts like high voltage for short."""
         self._ever, self._rest, self._since = _wider(self._ever, place), _wider(self._rest, place), _wider(self._since, could)
         moved = np.ptp(self._rest, axis=0) > 2 * np.where(np.isfinite(self._count), self._count, 0.0)
         self._rest, self._since = np.where(moved, place, self._rest), np.where(moved, could, self._since)
@@ -195,7 +195,7 @@ class MotionCheck:
         return self._unmoved(int(np.argmax(over)), np.ptp(self._rest, axis=0), reckoned) if over.any() else ""
 
     def _no_answer(self, place: FloatArray, could: FloatArray) -> str:
-        """Much could have moved, and the encoder has never shown more than next to nothing of it; or much varied, and it hardly shows."""
+        """Fault: a large motion was possible, and the encoder has never shown more than a negligible part; or much varied, and it hardly shows."""
         whole, ever = np.ptp(could, axis=0) * self.gain, np.ptp(self._ever, axis=0)
         ever = np.where((place[-1] > self._high) | (place[-1] < self._low), np.inf, ever)  # that has a reason of its own
         if (whole <= STRIDE * self._zone).all():
@@ -216,9 +216,9 @@ class MotionCheck:
         )
 
     def _wrong_way(self, times: FloatArray, place: FloatArray, could: FloatArray) -> str:
-        """Slow motion against the voltage; and what goes along with it shows the speed per volt.
+        """Fault: slow motion against the voltage. Motion in the right direction gives the estimate of the speed per volt.
 
-        Motion that follows the voltage itself and not its sum (a spring, a heavy mass) says nothing of the sign.
+        Motion proportional to the voltage itself and not to its integral (a spring, a heavy mass) gives no sign.
         """
         reckoned = could * self._gain
         for seconds in self._spans:
@@ -244,7 +244,7 @@ class MotionCheck:
         return ""
 
     def _not_coming_back(self, times: FloatArray, place: FloatArray) -> str:
-        """Beyond a limit for long, or pushed inward with all that is allowed and not slowed."""
+        """Fault: too long beyond a limit, or not slowed by full inward voltage."""
         now = place[-1]
         if ((now < self._high - self._zone) & (now > self._low + self._zone)).all():
             self._outside[:] = np.nan
@@ -283,18 +283,18 @@ class MotionCheck:
 
 
 def _wider(ends: FloatArray, values: FloatArray) -> FloatArray:
-    """(2, axes) least and greatest, with these values among them."""
+    """(2, axes) minimum and maximum, extended by these values."""
     return np.stack((np.fmin(ends[0], values), np.fmax(ends[1], values)))
 
 
 def _smooth(values: FloatArray, width: int) -> FloatArray:
-    """(n - width + 1, axes) means of ``width`` rows."""
+    """(n - width + 1, axes) moving averages over ``width`` rows."""
     sums = np.cumsum(np.vstack((np.zeros((1, values.shape[1])), values)), axis=0)
     return np.asarray((sums[width:] - sums[:-width]) / width, dtype=np.float64)
 
 
 def _detrended(values: FloatArray) -> FloatArray:
-    """Without mean and straight line."""
+    """The values without mean and straight line."""
     line = np.arange(len(values)) - (len(values) - 1) / 2
     centred = values - values.mean(axis=0)
     return np.asarray(centred - np.outer(line, line @ centred) / max(float(line @ line), 1e-300), dtype=np.float64)

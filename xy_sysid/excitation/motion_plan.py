@@ -1,7 +1,7 @@
-"""A motion that repeats itself from rest to rest, and from any of its samples the way to rest within the limit of acceleration.
+"""A periodic motion from rest to rest, and from each of its samples a way to rest within the acceleration limit.
 
-Braking at the limit of acceleration never leaves the limit of position: the motion itself turns before that limit with no more than this
-acceleration, so the way that is needed to stop from any of its speeds is there.
+Braking at the acceleration limit never exceeds the position limit: the motion itself reverses before that limit with at most this
+acceleration, so there is always enough distance to stop.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class MotionPoints:
     """Samples of a motion.
 
     sample: (n,) counter from the start of the motion; position, speed, acceleration: (n, axes) rad or m, and per s and s^2
-    brakes: the first point of them from which on it brakes, n if none; acceleration jumps there
+    brakes: index of the first braking point, n if none; acceleration is discontinuous there
     """
 
     sample: NDArray[np.int64]
@@ -32,34 +32,34 @@ class MotionPoints:
 
 
 class MotionPlan:
-    """The motion of all axes about the place where they stand; ``brake`` ends it."""
+    """The motion of all axes about their present positions; ``brake`` ends it."""
 
     def __init__(self, motions: Sequence[Trajectory | None], start: FloatArray, rate: float, limits: FloatArray) -> None:
-        """motions: one period of each axis about 0, None for an axis that stays; start: (axes,); rate: Hz; limits: (axes,) of acceleration."""
+        """motions: one period of each axis about 0, None for an axis at rest; start: (axes,); rate: Hz; limits: (axes,) of acceleration."""
         self._motions, self._start, self._rate, self._limits = tuple(motions), start, rate, limits
         self._brake: int | None = None
 
     def brake(self, sample: int) -> None:
-        """From this sample on, unless it brakes sooner."""
+        """Brake from this sample on, unless it brakes earlier."""
         self._brake = sample if self._brake is None else min(self._brake, sample)
 
     @property
     def rests(self) -> int | None:
-        """Sample from which on it stands; None as long as it goes on."""
+        """Sample from which it is at rest; None while it continues."""
         return None if self._brake is None else self._brake + int(np.max(self._steps(self._brake)))
 
     @property
     def place(self) -> FloatArray | None:
-        """(axes,) where it stands in the end; None as long as it goes on."""
+        """(axes,) final position; None while it continues."""
         rests = self.rests
         return None if rests is None else self.at(rests, 1).position[0]
 
     def at(self, first: int, n: int) -> MotionPoints:
-        """The n samples from this one on, as they are planned."""
+        """The n planned samples from this one on."""
         return self._points(np.arange(first, first + n), self._brake)
 
     def ahead(self, first: int, last: int) -> MotionPoints:
-        """From one sample to another, and from there to rest: what a controller can be told that hears no more of us."""
+        """The samples from first to last, and from there to rest: a controller can execute these without further messages."""
         brake = last if self._brake is None else min(last, self._brake)
         rest = brake + int(np.max(self._steps(brake)))
         return self._points(np.arange(first, max(rest, first) + 1), brake)
@@ -78,7 +78,7 @@ class MotionPlan:
         return MotionPoints(sample=sample, position=position, speed=speed, acceleration=push, brakes=int(np.sum(~braking)))
 
     def _moving(self, sample: NDArray[np.int64]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(n, axes) position, speed, acceleration as if it never ended; at rest before it begins."""
+        """(n, axes) position, speed, acceleration of the periodic motion without braking; at rest before its start."""
         shape = (sample.size, len(self._motions))
         position, speed, push = np.tile(self._start, (sample.size, 1)), np.zeros(shape), np.zeros(shape)
         for axis, motion in enumerate(self._motions):
@@ -89,6 +89,6 @@ class MotionPlan:
         return position, speed, push
 
     def _steps(self, sample: int) -> FloatArray:
-        """(axes,) whole samples that it takes to stop from the speed at a sample."""
+        """(axes,) integer number of samples needed to stop from the speed at a sample."""
         speed = self._moving(np.array([sample]))[1][0]
         return np.asarray(np.ceil(np.abs(speed) * self._rate / self._limits - 1e-9))

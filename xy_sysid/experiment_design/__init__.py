@@ -13,5 +13,5 @@ precision:   the experiment that determines parameters most precisely
 first:       a first experiment for an unknown axis
 loop:        design, run and compare, repeated until no question is open
 of_run:      one call for a diagnosis
-walk:        the loop for recordings of a machine: diagnosed together after each experiment, told in sentences
+walk:        the loop for recordings of a machine, which are diagnosed together after each experiment; progress in sentences
 """

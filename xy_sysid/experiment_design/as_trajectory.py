@@ -1,4 +1,4 @@
-"""A designed experiment for a robot that takes only trajectories: the expected motion, from rest to rest, within the limits."""
+"""A designed experiment for a robot that accepts only trajectories: the expected motion, from rest to rest, within the limits."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from xy_sysid.experiment_design.of_run import NextExperiment
 
 
 def as_trajectory(found: NextExperiment, model: AxisModel, rate: float) -> Trajectory:
-    """Points of the motion that an experiment makes of the fitted model.
+    """Points of the motion that the fitted model makes in an experiment.
 
-    rate: points a second; what is faster than an eighth of it is left out, as no controller could follow it between its points
-    Raises BadInput where there is no experiment, for a rate above the recording's, and for a motion that would leave a limit of the machine.
+    rate: points per second; frequencies above an eighth of it are removed, because a controller cannot follow them between points
+    Raises BadInput if there is no experiment, for a rate above the recording's, and for a motion that would exceed a limit of the machine.
     """
     if found.experiment is None:
         raise BadInput("experiment", "none", "one that helps", "Give wider limits, or another setup.")
@@ -40,7 +40,7 @@ def as_trajectory(found: NextExperiment, model: AxisModel, rate: float) -> Traje
 
 
 def _within(found: NextExperiment, made: Trajectory) -> None:
-    """Raises BadInput for a trajectory that comes nearer to a limit than the margin."""
+    """Raises BadInput for a trajectory that is closer to a limit than the margin."""
     limits = found.limits
     free = 1.0 - limits.margin
     low, high = (limits.start + free * (end - limits.start) for end in limits.travel)

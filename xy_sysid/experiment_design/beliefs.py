@@ -1,10 +1,10 @@
-"""A set of effects with its parameters and their uncertainty after the present data.
+"""A set of effects with its parameters and their uncertainty, given the present data.
 
-Parameters are Gaussian in the coordinates of the fit (``greybox.least_squares.Scale``: the logarithm of what is positive). Their precision is
-the information of the data, and a little more: a positive number is known to a factor of two before anything is measured, and the shape of a
-law (what may be zero or negative) to what is usual over the travel of the machine. Draws that the data contradict are left out, and so are laws
-that are not valid over the travel (``Effect.refusal``): a short motion shows little of a shape, and a fit of it may be absurd farther out.
-An effect that does not show in the data keeps its usual size, if the data allow it.
+Parameters are Gaussian in the coordinates of the fit (``greybox.least_squares.Scale``: the logarithm of positive ones). Their precision is
+the information of the data plus a weak prior: a positive parameter is known to a factor of two before any measurement, and the shape of a
+law (parameters that may be zero or negative) to the usual size over the machine's travel. Draws that contradict the data are omitted, and so are
+laws that are not valid over the travel (``Effect.refusal``): a short motion hardly determines a shape, and its fit may be absurd farther out.
+An effect that is not visible in the data keeps its usual size, if the data allow it.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True)
 class Belief:
-    """effects: their names; model: the likeliest; draws: models that the data allow, the likeliest first
-    scale: how each parameter moves; precision: (k, k) in its coordinates; free: parameters of the effects
+    """effects: their names; model: the most likely; draws: models that the data allow, most likely first
+    scale: coordinates of each parameter; precision: (k, k) in these coordinates; free: parameters of the effects
     force, motion: power of the unmodelled force, V^2, and of the unmodelled motion, m^2/s^2
     """
 
@@ -47,7 +47,7 @@ class Belief:
 
     @property
     def name(self) -> str:
-        """Its effects in words."""
+        """The names of the effects in words."""
         return " and ".join(self.effects) or "the rigid model"
 
     def inner(self, model: AxisModel) -> FloatArray:
@@ -63,7 +63,7 @@ class Evidence:
     """How well models explain the present data: in nats over every window, fitted or held out."""
 
     def __init__(self, data: AxisData, travel: tuple[float, float] | None = None) -> None:
-        """travel: of the machine, m; None: as far as the data went."""
+        """travel: of the machine, m; None: the range of the data."""
         self.travel = travel
         self.machine = data.similar if travel is None else replace(data.similar, length=0.5 * (travel[1] - travel[0]) / REACH)
         self.data, self.windows = data, Windows(data.layout, np.sort(np.concatenate((data.fitted.begins, data.held_out.begins))))
@@ -71,22 +71,22 @@ class Evidence:
         self.measured = self.windows.spectrum(data.velocity)
 
     def sizes(self, effect: Effect) -> list[Parameter]:
-        """Its parameters, their usual sizes as the data show them, and of shapes as they are usual over the travel."""
+        """The effect's parameters: usual sizes from the data, and for shapes from the travel."""
         pairs = zip(effect.on(self.data.similar), effect.on(self.machine), strict=True)
         return [seen if seen.positive else over for seen, over in pairs]
 
     def valid(self, model: AxisModel) -> bool:
-        """Whether its laws hold over the travel."""
+        """True if the model's laws are valid over the travel."""
         told = [(model.library[name].refusal, values) for name, values in model.effects]
         return self.travel is None or not any(refusal(values, self.travel) for refusal, values in told if refusal is not None)
 
     def error(self, model: AxisModel) -> NDArray[np.complex128]:
-        """(windows, lines) of a model."""
+        """(windows, lines) velocity error of a model."""
         task = problem(self.data, model, False)
         return np.asarray(self.measured - self.windows.spectrum(task.at(MEDIUM)(task.row)))
 
     def nats(self, model: AxisModel, error: NDArray[np.complex128] | None = None) -> float:
-        """Above an error that is the floor alone; infinite for a model that runs away."""
+        """Nats above an error that equals the noise floor; infinite for a model that diverges."""
         error = self.error(model) if error is None else error
         power = self.data.layout.power(error)
         if not np.all(np.isfinite(power)):
@@ -99,7 +99,7 @@ class Evidence:
         return self.objective.floor + force * self.objective.response + motion, force, motion
 
     def whitened(self, model: AxisModel, scale: Scale) -> tuple[FloatArray, FloatArray]:
-        """(k, m) derivatives of the error by the coordinates, and (m,) the error itself, both over its expected size."""
+        """(k, m) derivatives of the error by the coordinates, and (m,) the error, both divided by its expected size."""
         error, inner = self.error(model), scale.inner(model.row)
         spectrum, _, _ = self.spectrum(error)
         weight = ((self.objective.lines > 0.0) / np.sqrt(spectrum))[self.data.layout.band]
@@ -113,22 +113,22 @@ class Evidence:
 
 
 def with_row(model: AxisModel, row: FloatArray) -> AxisModel:
-    """The model with these parameters, in the order of ``AxisModel.row``."""
+    """The model with these parameter values, in the order of ``AxisModel.row``."""
     rest = iter(row[3:].tolist())
     effects = tuple((name, tuple(next(rest) for _ in values)) for name, values in model.effects)
     return replace(model, gain=float(row[0]), delay=float(row[1]), pole=float(row[2]), effects=effects, per_recording=())
 
 
 def usual_precision(evidence: Evidence, model: AxisModel, scale: Scale) -> FloatArray:
-    """(k, k) before anything is measured: a factor of two of what is positive, its usual size of the rest."""
+    """(k, k) prior precision: a factor of two for positive parameters, the usual size for the others."""
     usual = np.array([*scale.unit[:3], *(unit_of(item) for name, _ in model.effects for item in evidence.sizes(model.library[name]))])
     each = np.where(scale.positive, 1.0 / FACTOR**2, (scale.unit / usual) ** 2)
-    each[:3] = 1e-6  # the base is what the data know best
+    each[:3] = 1e-6  # the data determine the base best
     return np.diag(each)
 
 
 def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -> Belief:
-    """What a fit says: draws about it, as wide as the data leave them."""
+    """The belief from a fit: draws around it, as wide as the data allow."""
     model = _valid(evidence, replace(found.model, per_recording=()))
     scale = _scale(evidence.data, model)
     slopes, _ = evidence.whitened(model, scale)
@@ -139,7 +139,7 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
     for tried in range(TRIES * count):
         if len(draws) >= count:
             break
-        width = 0.5 ** (3.0 * tried / (TRIES * count))  # where the likelihood bends, nearer ones
+        width = 0.5 ** (3.0 * tried / (TRIES * count))  # closer draws, if the likelihood is curved
         drawn = with_row(model, scale.outer(inner + width * spread @ random.standard_normal(inner.size)))
         if evidence.valid(drawn) and evidence.nats(drawn) - best < ALLOWED:
             draws.append(drawn)
@@ -147,10 +147,10 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
 
 
 def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
-    """An effect that the data do not show, together with a model that explains them: the usual sizes that the data allow.
+    """Add an effect that is not visible in the data to a model that explains them, with the usual sizes that the data allow.
 
-    A relative in the model gives way, and what it calls by the same name is taken over. None where the data allow no such size.
-    best: nats of what explains the data best; draws: how many are wanted, and their seed
+    A relative in the model is replaced, and parameters of the same name keep their values. None if the data allow no such size.
+    best: nats of the model that explains the data best; draws: number of draws, and their seed
     """
     count, seed = draws
     found: list[AxisModel] = []
@@ -171,7 +171,7 @@ def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: t
 
 
 def _valid(evidence: Evidence, model: AxisModel) -> AxisModel:
-    """Without the shapes of laws that are not valid over the travel, if the data do not insist on them."""
+    """The model without shapes of laws that are not valid over the travel, unless the data require them."""
     if evidence.valid(model):
         return model
     plain, fixed = [], set()
@@ -186,13 +186,13 @@ def _valid(evidence: Evidence, model: AxisModel) -> AxisModel:
 
 
 def _relative(model: AxisModel, name: str) -> str | None:
-    """The effect of a model whose place another takes."""
+    """The effect of a model that is replaced by another of its family."""
     effect = model.library[name]
     return next((own for own, _ in model.effects if effect.family and model.library[own].family == effect.family), None)
 
 
 def _shared(model: AxisModel, name: str) -> dict[str, float]:
-    """Values of a relative's parameters that an effect calls by the same name."""
+    """Values of a relative's parameters that have the same name in this effect."""
     relative = _relative(model, name)
     known = dict(zip(model.library[relative].names, dict(model.effects)[relative], strict=True)) if relative else {}
     return {key: known[key] for key in model.library[name].names if key in known}
@@ -216,7 +216,7 @@ def _usual(evidence: Evidence, rest: AxisModel, name: str, count: int, seed: int
 
 
 def _settled(evidence: Evidence, model: AxisModel, fixed: set[str]) -> AxisModel:
-    """Steps of Gauss and Newton of all parameters but some, so that the others make room for these."""
+    """Gauss-Newton steps of all parameters except the fixed ones, so that the others adapt to these."""
     scale = _scale(evidence.data, model)
     free = np.array([key not in fixed for key in model.values()])
     now = evidence.nats(model)
@@ -224,7 +224,7 @@ def _settled(evidence: Evidence, model: AxisModel, fixed: set[str]) -> AxisModel
         slopes, error = evidence.whitened(model, scale)
         if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(error))):
             break
-        inner = scale.inner(model.row)  # what the data do not show, or show together with others, takes the smallest step
+        inner = scale.inner(model.row)  # directions that the data do not determine take the smallest step
         inner[free] -= np.clip(np.linalg.lstsq(slopes[free].T, error, rcond=LEAST_SEEN)[0], -0.5, 0.5)
         moved = with_row(model, scale.outer(inner))
         then = evidence.nats(moved)

@@ -16,15 +16,15 @@ from xy_sysid.settings import AxisExcitation
 TABLE = Criteria()
 _number = TABLE.number
 
-# what is settled
+# when a question counts as settled
 SURE = _number("sure", 0.95, "1", "probability with which sets are to be distinguished: the usual one of intervals")
 ODDS = math.log(SURE / (1.0 - SURE))  # nats: likelihood ratio at which one of two is that probable (Wald 1945)
-JUDGED = HELD_OUT_BLOCK / (FITTED_BLOCK + HELD_OUT_BLOCK)  # part of a record that judges
-FITTED = FITTED_BLOCK / (FITTED_BLOCK + HELD_OUT_BLOCK)  # part of a record that a fit sees
+JUDGED = HELD_OUT_BLOCK / (FITTED_BLOCK + HELD_OUT_BLOCK)  # fraction of a record for judging
+FITTED = FITTED_BLOCK / (FITTED_BLOCK + HELD_OUT_BLOCK)  # fraction of a record for fitting
 NO_EVIDENCE = _number("no evidence", 1.0, "nats", "expected likelihood ratio below this by the whole budget: the sets are the same on this machine")
 MINIMUM = _number("minimum", 2.0, "s", "less motion than this in the budget is worth no experiment: one block")
 
-# what is believed before the experiment
+# beliefs before the experiment
 ALLOWED = _number("allowed", 3.0, "nats", "a draw may explain the data at hand worse than the best by a factor of twenty in likelihood")
 FACTOR = _number("usual factor", math.log(USUAL_WITHIN), "1", "standard deviation of the logarithm of a positive parameter that no data show")
 DRAWS = _number("draws", 6, "draws", "parameters of each set that are simulated: a probability in the mean over six is known to 0.2")
@@ -33,7 +33,7 @@ REACH = _number("usual reach", float(AxisExcitation.model_fields["travel_max"].d
 STEPS = _number("steps", 3, "steps", "Gauss-Newton steps in which a model makes room for a hidden effect, fewer if one gains below 0.1 nats")
 LEAST_SEEN = _number("least seen", 3e-5, "1", "of the best seen direction in the parameters: one that the data show less is left as it is")
 
-# which experiments are compared
+# experiments that are compared
 CREST = _number("crest", 4.2, "1", "peak of Gaussian noise over its rms: one sample in 40,000 is beyond")
 FULL = _number("full", 0.95, "1", "part of the largest voltage that an experiment plans for: the rest is for centring")
 QUIETER = _number("quieter", 5, "levels", "amplitudes of each kind, each half of the one before: weak effects show at a sixteenth")
@@ -41,7 +41,7 @@ TOP = _number("top", 0.15, "1", "highest frequency proposed, over the sampling r
 LONGEST = _number("longest period", 10.0, "s", "of a slow sine: six periods in the usual minute")
 PLACES = _number("places", 0.75, "1", "part of the room to either side at which the axis is held for an experiment away from its start")
 
-# how they are judged
+# how experiments are judged
 LOOKED = _number("looked", 8.0, "s", "of each experiment are simulated: two periods of the longest sweep; longer ones go on as they began")
 COARSE = _number("coarse", 4000.0, "Hz", "sub-steps of these simulations, as short as a screening fit takes them")
 ROUNDS = _number(

@@ -1,8 +1,8 @@
 """The experiment within the limits that distinguishes some sets of effects in the shortest time.
 
-First every proposal is judged by the likeliest model of each set, then the best by draws of their parameters, and then the neighbours of the
-best. An experiment is judged by the seconds after which the true set is told from its rivals with 95 % probability, in the mean over sets
-and draws; where none gets there, by the probability at its end.
+First every proposal is judged with the most likely model of each set. Then the best ones are judged with draws of the parameters, and then their
+neighbours. The measure is the time in seconds after which the true set is distinguished from its rivals with 95 % probability, averaged over sets
+and draws. If no experiment achieves this, the measure is the probability at its end.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from xy_sysid.hypotheses.criteria import DOUBTFUL
 class Judged:
     """An experiment with its evaluation.
 
-    seconds: of steady motion after which the sets are distinguished with 95 %, infinite if ``most`` do not suffice; probability: that they
-    are at the end; each: powers of each draw; broken: which limit it would come too near to, or nothing; shortest: s that it lasts at least
+    seconds: of steady motion after which the sets are distinguished with 95 %, infinite if ``most`` do not suffice; probability: of this
+    at the end; each: powers of each draw; broken: name of a limit that it would exceed, or empty; shortest: its least duration, s
     """
 
     experiment: Experiment
@@ -40,14 +40,14 @@ class Judged:
 
     @property
     def order(self) -> tuple[float, float, float]:
-        """Less is better; if no experiment decides, the evidence per second counts."""
+        """Sort key, smaller is better; if no experiment decides, the evidence per second counts."""
         rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
         if math.isfinite(self.seconds):
             return max(self.seconds + self.experiment.ramp, self.shortest), 0.0, -rate
         return math.inf, -round(self.probability / ALIKE), -rate
 
     def lasting(self, seconds: float) -> Judged:
-        """The same for so many s, and what it is worth then."""
+        """The experiment with this duration, and its evaluation."""
         steady = seconds - self.experiment.ramp
         reached = self.seconds if self.seconds <= steady else math.inf
         return replace(self, experiment=self.experiment.lasting(seconds), seconds=reached, probability=settled(self.each, steady))
@@ -55,7 +55,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Design:
-    """beliefs: the sets that are to be distinguished; best: the experiment that does it soonest; tried: all that were judged; rate: Hz."""
+    """beliefs: the sets to distinguish; best: the experiment that does it in the shortest time; tried: all evaluated ones; rate: Hz."""
 
     beliefs: tuple[Belief, ...]
     limits: MachineLimits
@@ -64,35 +64,35 @@ class Design:
     rate: float
 
     def lasting(self, seconds: float) -> Design:
-        """The same with so many s for the best experiment, and what it promises then."""
+        """The design with this duration for its best experiment, and the new evaluation."""
         return self if self.best is None else replace(self, best=self.best.lasting(seconds))
 
     def broken(self, experiment: Experiment) -> str:
-        """Which limit an experiment would come too near to in all of its time, by any draw, in a word, or nothing."""
+        """Name of the limit that an experiment would exceed at any time with any draw, or empty."""
         return broken_in_time([model for belief in self.beliefs for model in belief.draws], self.rate, self.limits, experiment)
 
     @property
     def possible(self) -> bool:
-        """Whether an experiment within the limits distinguishes the sets with 95 %."""
+        """True if an experiment within the limits distinguishes the sets with 95 %."""
         return self.best is not None and math.isfinite(self.best.seconds)
 
     @property
     def alike(self) -> bool:
-        """Whether the sets are the same within the limits of the machine: no experiment within the limits gives evidence for any of their draws."""
+        """True if no experiment within the machine's limits gives evidence for any draw of the sets."""
         looked = [item for item in self.tried if item.each]
         most = max((one.rate for item in looked for draw in item.each for one in draw), default=math.inf)
         return most * JUDGED * self.limits.seconds < NO_EVIDENCE
 
     @property
     def helps(self) -> bool:
-        """Whether the best experiment may decide, or gives information for a better one."""
+        """True if the best experiment may decide, or gives information for a better one."""
         return self.best is not None and self.best.probability >= DOUBTFUL
 
 
 def design(
     setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, seed: int = 1, tell: Callable[[float], None] = lambda part: None
 ) -> Design:
-    """The experiment for some beliefs; tell: called with the part that is done."""
+    """The best experiment for some beliefs; tell: called with the progress, 0..1."""
     setting, rate = replace(setting, ramp=limits.ramp), setting.layout.sampling_rate
     first = proposals(limits, rate, seed)
     judged = []
@@ -122,7 +122,7 @@ def design(
 
 
 def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimits, experiment: Experiment) -> str:
-    """Which limit an experiment would come too near to in all of its time, by any of some models, in a word, or nothing. rate: Hz"""
+    """Name of the limit that an experiment would exceed at any time with any of the models, or empty. rate: Hz"""
     drive = experiment.drive(rate, experiment.seconds, limits.start)
     return next((word for model in models if (word := limits.broken(move(model, rate, drive, COARSE)))), "")
 
@@ -148,7 +148,7 @@ def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, ex
 
 
 def _timed(item: Judged, limits: MachineLimits) -> Judged:
-    """With the seconds that it should last."""
+    """The evaluation with the duration that the experiment should have."""
     most = limits.seconds - limits.ramp
     steps = (BLOCK * k for k in range(1, math.ceil(most / BLOCK)))
     wanted = item.seconds

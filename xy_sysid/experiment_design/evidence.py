@@ -1,8 +1,8 @@
 """How well a rival would explain a recording if a set of effects were true, and the probability of a decision after a given time.
 
-T-optimality (Atkinson & Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62, 1975): the error that
-the rival leaves with the parameters that suit the experiment best. These may move as far as the data at hand allow. The error is scored by the
-objective of every fit here (``greybox.objective``), so what noise, an unmodelled force or an unmodelled motion explains does not count.
+T-optimality (Atkinson & Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62, 1975): the error of
+the rival with the parameters that fit the experiment best. These may differ as far as the present data allow. The error is scored by the
+objective of every fit here (``greybox.objective``), so errors explained by noise, an unmodelled force or an unmodelled motion do not count.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from xy_sysid.hypotheses.criteria import PRICE
 
 @dataclass(frozen=True, slots=True)
 class Power:
-    """Evidence for one draw of one set against one rival: nats a second; price: nats that its further parameters cost."""
+    """Evidence for one draw of one set against one rival: nats per second; price: nats for its additional parameters."""
 
     truth: int
     rival: int
@@ -32,7 +32,7 @@ class Power:
     price: float
 
     def probability(self, seconds: float) -> float:
-        """That the rival is refuted after some seconds: the ratio of likelihoods is normal with twice its mean as variance."""
+        """Probability that the rival is refuted after some seconds: the log likelihood ratio is normal, and its variance is twice its mean."""
         mean = self.rate * JUDGED * max(seconds, 0.0)
         if mean <= 0.0:
             return 0.0
@@ -40,9 +40,9 @@ class Power:
 
 
 def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> list[Power]:
-    """Of what one draw of a set would record: of the first set against every other, and of each other set against the first.
+    """Powers for one draw of a set: for the first set against every other one, for another set against the first.
 
-    A rival that holds the set as a special case is left out: it explains all that the set does, and is judged where it is the truth.
+    A rival that contains the set as a special case is left out: it explains everything that the set does. It is judged as the true set.
     """
     own, library = beliefs[truth], model.library
     found = []
@@ -54,9 +54,9 @@ def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Record
 
 
 def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> float:
-    """Expected ratio of likelihoods of the windows of a recording that a model of the first set makes, against the second that suits itself to it.
+    """Expected log likelihood ratio over a recording's windows: a model of the first set against the second set, refitted to that recording.
 
-    What each set has to leave of the data at hand counts for both.
+    Both include the penalty from the present data.
     """
     own, rival = sets
     least, count = expected_error(item, own), item.windows.begins.size
@@ -89,9 +89,9 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
 
 
 def settled(each: Sequence[Sequence[Power]], seconds: float) -> float:
-    """Probability that the true set is distinguished from every rival after some seconds, over sets and draws with the same weight.
+    """Probability that the true set is distinguished from every rival after some seconds, with equal weights for sets and draws.
 
-    each: for one draw of one set its powers, the sets that have none left out
+    each: powers of one draw of one set; sets without rivals are left out
     """
     judged = [item for item in each if item]
     if not judged:
@@ -105,7 +105,7 @@ def settled(each: Sequence[Sequence[Power]], seconds: float) -> float:
 
 
 def seconds_needed(each: Sequence[Sequence[Power]], most: float) -> float:
-    """s after which the sets are distinguished with 95 %; infinite where ``most`` seconds do not suffice."""
+    """s after which the sets are distinguished with 95 %; infinite if ``most`` seconds do not suffice."""
     if settled(each, most) < SURE:
         return math.inf
     low, high = 0.0, most

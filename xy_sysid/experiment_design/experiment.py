@@ -13,15 +13,15 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import USUAL, Units, readable
 
-RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s in which the excitation fades in, by default
-AGE = 0.04  # s: age of the position by which the excitation pulls back to the start
-KEPT = 64  # signals, as many as differ in more than their amplitude
+RAMP = float(ExcitationSettings.model_fields["ramp"].default)  # s of fade-in, by default
+AGE = 0.04  # s: age of the position in the centring towards the start
+KEPT = 64  # cached signals; only those that differ in more than the amplitude count
 BANDED = ("noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "stepped_sine", "prbs")  # kinds that have a band
 
 
 @lru_cache(maxsize=KEPT)
 def unit_signal(told: AxisExcitation, sampling_rate: float, n: int) -> FloatArray:
-    """(n,) of rms 1, read-only: many experiments differ in their amplitude alone, and each is simulated with many models."""
+    """(n,) signal of rms 1, read-only: many experiments differ only in their amplitude, and each is simulated with many models."""
     made = signal(told, sampling_rate).next(n)
     made.setflags(write=False)
     return made
@@ -29,18 +29,18 @@ def unit_signal(told: AxisExcitation, sampling_rate: float, n: int) -> FloatArra
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """excitation: of the axis, with its limits; seconds: of motion; ramp: s in which it fades in."""
+    """excitation: of the axis, with its limits; seconds: of motion; ramp: s of fade-in."""
 
     excitation: AxisExcitation
     seconds: float = 0.0
     ramp: float = RAMP
 
     def lasting(self, seconds: float) -> Experiment:
-        """The same for another time."""
+        """The experiment with another duration."""
         return replace(self, seconds=seconds)
 
     def drive(self, sampling_rate: float, seconds: float, start: float) -> DriveInput:
-        """What it makes of an axis that stands at ``start``, as ``excitation.drive.Drive`` does between its guards."""
+        """The drive for an axis at position ``start``, as ``excitation.drive.Drive`` produces it within its guards."""
         told, n = self.excitation, round(seconds * sampling_rate)
         time = np.arange(n) / sampling_rate
         fade = 0.5 * (1.0 - np.cos(np.pi * np.minimum(time / self.ramp, 1.0))) if self.ramp else np.ones(n)
@@ -50,7 +50,7 @@ class Experiment:
         )
 
     def _signal(self, sampling_rate: float, n: int) -> FloatArray:
-        """(n,) of rms 1."""
+        """(n,) signal of rms 1."""
         told = self.excitation
         if told.kind == "off" or told.rms == 0.0:
             return np.zeros(n)

@@ -1,9 +1,9 @@
 """A first experiment for an unknown axis with known limits.
 
-An axis is taken to cross its travel at full voltage in between a third of a second and ten seconds, with any pole, delay and dry friction that
-machines have, and with a load that its friction holds: the axis rests at 0 V, which the first run (``xy-sysid run --first``) tells.
+The axis is assumed to cross its travel at full voltage in 0.3 to 10 s, with any pole, delay and dry friction that
+machines have, and with a load that is smaller than its friction: the axis rests at 0 V, which the first run (``xy-sysid run --first``) checks.
 
-The experiment keeps within the limits for every draw of these, and tells most about gain, delay and pole in the mean over them.
+The experiment keeps within the limits for every draw of these, and gives the most information on gain, delay and pole on average.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ CROSSES = (0.3, 10.0)  # s in which an axis crosses its travel at full voltage
 POLE = (5.0, 500.0)  # rad/s
 DELAY = (0.5e-3, 5e-3)  # s
 FRICTION = (0.01, 0.2)  # of the full voltage
-COUNTS = 1e5  # of the encoder within the travel, at least
-WIDTH = 0.05  # half of the 95 % interval of gain and pole that is asked for
+COUNTS = 1e5  # encoder counts within the travel, at least
+WIDTH = 0.05  # wanted half width of the 95 % interval of gain and pole
 DRAWS = 8
-SHORTEST = 30.0  # s: a diagnosis needs windows that judge, whatever gain and pole need
+SHORTEST = 30.0  # s: a diagnosis needs held-out windows, whatever gain and pole need
 
 
 def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, seed: int = 1) -> NextExperiment:
-    """A good first experiment for an unknown axis: how loud, which band, how long. Raises BadInput for limits that make no sense."""
+    """A good first experiment for an unknown axis: amplitude, band, duration. Raises BadInput for inconsistent limits."""
     encoder = (limits.travel[1] - limits.travel[0]) / COUNTS / math.sqrt(12.0)
     setting = Setting(bands(sampling_rate, int(LOOKED * sampling_rate / WINDOWS)), encoder, EPSILON, ramp=limits.ramp)
     models = _draws(limits, seed)
@@ -69,14 +69,14 @@ def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, see
 
 
 def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:
-    """Axes that may be there, the fastest among them."""
+    """Possible axes, including the fastest."""
     random = np.random.default_rng(seed)
     found = []
     for number in range(DRAWS):
         crosses, pole, delay, friction = (low * (high / low) ** random.uniform() for low, high in (CROSSES, POLE, DELAY, FRICTION))
         gain = (limits.travel[1] - limits.travel[0]) / (limits.voltage * (crosses if number else CROSSES[0]))
         rubs = friction if number else FRICTION[0]
-        held = random.uniform(-1.0, 1.0) * rubs  # a load that the friction holds
+        held = random.uniform(-1.0, 1.0) * rubs  # a load that is smaller than the friction
         model = AxisModel(gain, delay, pole).with_effect(SIMPLEST_FRICTION.name, (rubs * limits.voltage,))
         found.append(model.with_effect(SIMPLEST_LOAD.name, (held * limits.voltage,)))
     return found
@@ -95,7 +95,7 @@ def _informations(setting: Setting, models: list[AxisModel], limits: MachineLimi
 
 
 def _believed(model: AxisModel) -> Belief:
-    """A draw as if it were known, so that its sensitivities can be asked for."""
+    """A draw as a belief, for the calculation of its sensitivities."""
     low, high = np.array([-np.inf, 0.0, 1e-2, 1e-9, -np.inf]), np.array([np.inf, 1.0, 1e5, 1e3, np.inf])
     scale = Scale(low, high, np.array([False, False, True, True, False]), np.array([model.gain, model.delay, 1.0, 1.0, 1.0]))
     effects = tuple(name for name, _ in model.effects)
@@ -103,12 +103,12 @@ def _believed(model: AxisModel) -> Belief:
 
 
 def _width(item: Information, seconds: float) -> float:
-    """The wider of the half intervals of gain and pole, as parts of them."""
+    """The larger of the half widths of gain and pole, as fractions of their values."""
     covariance = item.covariance(1e-6 * np.eye(item.each_second.shape[0]), FITTED * seconds)
     return Z95 * math.sqrt(max(float(covariance[0, 0]), float(covariance[2, 2])))
 
 
 def _seconds(found: list[Information], most: float) -> float:
-    """s after which the mean of the intervals is as narrow as asked for, ``most`` at most."""
+    """s after which the mean of the intervals reaches the wanted width, ``most`` at most."""
     steps = np.arange(2.0, most + 1.0, 2.0)
     return next((float(step) for step in steps if float(np.median([_width(item, float(step)) for item in found])) <= WIDTH), most)

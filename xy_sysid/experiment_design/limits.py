@@ -23,11 +23,11 @@ SECONDS = 60.0  # s of motion for one experiment at most
 
 @dataclass(frozen=True, slots=True)
 class MachineLimits:
-    """Of one axis.
+    """The limits of one axis.
 
     voltage: V, of each sample; rms: V, that the drive can give continuously (its current); speed: m/s; acceleration: m/s^2
     travel: (low, high) m; start: m, position at the start of an experiment; with recordings, the end of the last one
-    margin: part of speed, acceleration and travel that is kept free; seconds: s of one experiment at most
+    margin: fraction of speed, acceleration and travel that is kept free; seconds: maximum s of one experiment
     centring: V/m, largest pull of the excitation to the start; above it the axis would oscillate
     ramp: s, fade-in of the excitation; brake: m, brake zone before each end of the travel, which no experiment enters
     units: of the axis, for messages; V and m above stand for them
@@ -65,12 +65,12 @@ class MachineLimits:
             raise BadInput("travel", self.span(self.travel), allowed, "Give the ends of the travel, or move the axis between them.")
 
     def place(self, where: float) -> str:
-        """A place as people read it: 110.7 mm, 1.2 rad."""
+        """A position in display units: 110.7 mm, 1.2 rad."""
         scale, unit = readable(self.units.output)
         return f"{scale * where:.4g} {unit}"
 
     def span(self, travel: tuple[float, float], to: str = " to ") -> str:
-        """Two places as people read them."""
+        """Two positions in display units."""
         scale, _ = readable(self.units.output)
         return f"{scale * travel[0]:.4g}{to}{self.place(travel[1])}"
 
@@ -80,16 +80,16 @@ class MachineLimits:
         return min(map(self._free, (self.start - self.travel[0], self.travel[1] - self.start)))
 
     def _free(self, way: float) -> float:
-        """m of the way to an end that a motion may take: up to the margin, and not into the brake zone."""
+        """m of the distance to an end that a motion may use: up to the margin, outside the brake zone."""
         return min((1.0 - self.margin) * way, way - self.brake)
 
     def needed(self, low: float, high: float) -> tuple[float, float]:
-        """The travel that a motion between two places needs, with the margin."""
+        """The travel needed by a motion between two positions, including the margin."""
         free = 1.0 - self.margin
         return max(self.start + (low - self.start) / free, self.travel[0]), min(self.start + (high - self.start) / free, self.travel[1])
 
     def broken(self, motion: Motion) -> str:
-        """Which limit a motion would come too near to, in a word, or nothing."""
+        """The name of a limit that a motion would exceed, including the margin, or empty."""
         if not np.all(np.isfinite(motion.position)):
             return "a model whose simulation diverges"
         speed, acceleration = fastest(motion)
@@ -109,12 +109,12 @@ class MachineLimits:
 def fastest(motion: Motion) -> tuple[float, float]:
     """The largest speed and acceleration of a motion, m/s and m/s^2."""
     speed = np.diff(motion.position) * motion.sampling_rate
-    count = max(round(1e-3 * motion.sampling_rate), 1)  # over a millisecond
+    count = max(round(1e-3 * motion.sampling_rate), 1)  # averaged over a millisecond
     return _peak(speed), _peak(np.diff(speed[::count]) * motion.sampling_rate / count)
 
 
 def of_settings(settings: ExcitationSettings, axis: str) -> dict[str, Any]:
-    """The limits of an axis, by name, in the settings of its excitation."""
+    """The limits of an axis, by name, from the settings of its excitation."""
     own = settings.axes[axis]
     return {
         "voltage": own.limit,
@@ -128,10 +128,10 @@ def of_settings(settings: ExcitationSettings, axis: str) -> dict[str, Any]:
 
 
 def as_recorded(runs: Sequence[Run], **told: Any) -> MachineLimits:
-    """Nothing beyond what some recordings show: the largest voltage of all, and the travel of the last one, from where it ends.
+    """Limits from recordings: the largest voltage of all, and the travel of the last one, starting at its end.
 
-    Another recording may have another zero, so its places say nothing of those of the last one. told: limits that are known
-    Raises BadInput where the last recording does not move, or ends where it went farthest.
+    Another recording may have another zero, so its positions do not apply to the last one. told: known limits
+    Raises BadInput if the last recording does not move, or ends at its furthest position.
     """
     voltage, last = max(_peak(run.voltage) for run in runs), runs[-1]
     travel = float(np.min(last.position)), float(np.max(last.position))
@@ -145,5 +145,5 @@ def _peak(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
 
 
 def _most(name: str) -> float:
-    """The largest value that the excitation takes for a setting of an axis."""
+    """The largest value that the excitation accepts for a setting of an axis."""
     return float(next(bound.le for bound in AxisExcitation.model_fields[name].metadata if hasattr(bound, "le")))

@@ -1,6 +1,6 @@
-"""Design, run and compare, repeated until one set of effects is left.
+"""Design, run and compare, repeated until one set of effects remains.
 
-A pure function of the recordings that the experiments bring: with the same recordings it takes the same decisions.
+A pure function of the experiments' recordings: the same recordings give the same decisions.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from xy_sysid.units import USUAL, Units
 
 Ending = Literal["settled", "alike", "impossible", "experiments", "seconds", "stopped"]
 Signals = tuple[FloatArray, FloatArray]  # voltage and position, (n,) each
-CarryOut = Callable[[Experiment], Signals | None]  # carries out an experiment; None if it was stopped
+CarryOut = Callable[[Experiment], Signals | None]  # runs an experiment; None if it was stopped
 
 
 @dataclass(frozen=True)
 class NextChoice:
-    """experiment: what comes next, None where none helps; found: what it was chosen from, if by ``design``."""
+    """experiment: the next one, None if none helps; found: the design that it comes from, if any."""
 
     experiment: Experiment | None
     found: Design | None = None
@@ -39,7 +39,7 @@ Choose = Callable[[Setting, Sequence[Belief], MachineLimits], NextChoice]
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """experiments, seconds: of motion, at most; draws: of the parameters of each set."""
+    """experiments, seconds: maximum number, and maximum s of motion; draws: of the parameters of each set."""
 
     experiments: int = 2
     seconds: float = 60.0
@@ -48,8 +48,8 @@ class Budget:
 
 @dataclass(frozen=True)
 class Decision:
-    """standing: how the sets explain all recordings so far; left: those that are still possible, the chosen one first
-    choice: what comes next; None where one set is left
+    """standing: how the sets explain all recordings so far; left: possible sets, the chosen one first
+    choice: the next experiment; None if one set remains
     """
 
     standing: Standing
@@ -58,7 +58,7 @@ class Decision:
 
     @property
     def then(self) -> Experiment | None:
-        """The next experiment; None where none is needed, or none helps."""
+        """The next experiment; None if none is needed, or none helps."""
         return self.choice.experiment if self.choice is not None else None
 
     @property
@@ -77,7 +77,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Settled:
-    """ended: why; steps: each decision, after the first recordings and after each experiment; recordings: of the experiments; seconds: of motion."""
+    """ended: reason; steps: decision after the first recordings and after each experiment; recordings: of the experiments; seconds: of motion."""
 
     ended: Ending
     steps: tuple[Decision, ...]
@@ -92,7 +92,7 @@ class Settled:
 
 @dataclass(frozen=True)
 class Question:
-    """sets: of effects that are to be distinguished; sampling_rate: Hz; recordings: voltage and position of those there are."""
+    """sets: of effects to distinguish; sampling_rate: Hz; recordings: voltage and position of the existing ones."""
 
     sampling_rate: float
     recordings: Sequence[Signals]
@@ -103,7 +103,7 @@ class Question:
 
 
 def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, tell: Callable[[float], None] = lambda part: None) -> NextChoice:
-    """The experiment of ``design``; none where none may tell. tell: called with the part that is done."""
+    """The experiment of ``design``; none if no experiment helps. tell: called with the progress, 0..1."""
     found: Design = design(setting, beliefs, limits, tell=tell)
     return NextChoice(found.best.experiment if found.best is not None and found.helps else None, found)
 
@@ -121,7 +121,7 @@ def decide(
 
 
 def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Budget | None = None, choose: Choose = best_design) -> Settled:
-    """Go on until one set is left, no experiment can tell, or the budget is spent."""
+    """Repeat until one set remains, no experiment helps, or the budget is used up."""
     budget = budget or Budget()
     recordings: list[Signals] = []
     steps: list[Decision] = []
@@ -140,7 +140,7 @@ def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Bud
 
 
 def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> Experiment | Ending:
-    """The next experiment after a decision, or why there is none. experiments, seconds: of motion, that were spent."""
+    """The next experiment after a decision, or why there is none. experiments, seconds: used so far, s of motion."""
     over = last.over()
     if over is not None or last.then is None:
         return over or "impossible"
@@ -149,11 +149,11 @@ def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> E
     room = budget.seconds - seconds
     if room < MINIMUM:
         return "seconds"
-    if experiments and experiments + 1 == budget.experiments:  # those before did not keep what they promised, and none comes after
+    if experiments and experiments + 1 == budget.experiments:  # the earlier ones gave less than expected, and this is the last one
         longer, made = last.then.lasting(room), last.choice.found if last.choice is not None else None
         if made is None or not made.broken(longer):
             return longer
     unsure = last.choice is not None and last.choice.found is not None and not last.choice.found.possible
-    if unsure and experiments + 1 < budget.experiments:  # what it teaches is for a better one, which needs its time too
+    if unsure and experiments + 1 < budget.experiments:  # it gives information for a better experiment, which needs time too
         room = max(0.5 * room, MINIMUM)
     return last.then.lasting(min(last.then.seconds, room))

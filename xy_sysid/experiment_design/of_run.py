@@ -33,8 +33,8 @@ class NextExperiment:
     """The next experiment for one axis.
 
     experiment: None if none helps; sentence: its expected result; sets: the sets of effects that it should distinguish
-    probability: of a decision; settles: whether that is 95 % or more; ask: what a person would have to change, or empty
-    needs: voltage and travel that it needs; limits: for which it was designed, with the units of the axis
+    probability: of a decision; settles: True if it is 95 % or more; ask: changes that the user would have to make, or empty
+    needs: required voltage and travel; limits: for which it was designed, with the units of the axis
     """
 
     axis: str
@@ -50,7 +50,7 @@ class NextExperiment:
 
     @property
     def seconds(self) -> float:
-        """s of motion; 0 where there is no experiment."""
+        """s of motion; 0 without an experiment."""
         return self.experiment.seconds if self.experiment is not None else 0.0
 
     def __repr__(self) -> str:
@@ -89,9 +89,9 @@ def next_experiment(
 
 
 def sharpen(found: Answer, parameter: str, width: float, limits: MachineLimits | None = None, tolerance: float = EPSILON) -> NextExperiment:
-    """The shortest experiment that determines a parameter of the diagnosed model with the wanted precision.
+    """The shortest experiment that determines a parameter of the diagnosed model with the given precision.
 
-    parameter: ``gain``, ``pole`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value (0.02: 2 %)
+    parameter: ``gain``, ``pole`` or ``effect.parameter``; width: half width of the 95 % interval, fraction of the value (0.02: 2 %)
     Raises BadInput as ``next_experiment``, and for a parameter that the model does not have.
     """
     if not 0.0 < width < math.inf:
@@ -131,21 +131,21 @@ def _data(found: Answer, tolerance: float) -> AxisData:
 
 
 def _limits(found: Answer, limits: MachineLimits | None) -> MachineLimits:
-    """Those that were given, in the units of the recordings, from where the last one ends; without, what the recordings show."""
+    """The given limits, in the units of the recordings, starting at the end of the last one; by default, limits from the recordings."""
     last = found.runs[-1]
     return as_recorded(found.runs) if limits is None else replace(limits, units=last.units, start=float(last.position[-1]))
 
 
 def check_enough(found: Answer) -> None:
-    """Raises BadInput for a diagnosis of too little data."""
+    """Raises BadInput for a diagnosis with too little data."""
     if not found.rungs or not found.runs:
         raise BadInput("diagnosis", found.verdict, "one of data that suffice", "Record for longer, or ask for a first experiment (--for nothing).")
 
 
 def answered(axis: str, rate: float, made: Design, library: Library, following: Experiment | None = None) -> NextExperiment:
-    """A design as an answer: the experiment with what it needs, what it is expected to bring, and what a person would have to change.
+    """A design as an answer: the experiment with its requirements, its expected result, and the changes that the user would have to make.
 
-    following: the experiment that is run whatever it may tell; None: the best one, if it may tell
+    following: the experiment that will be run in any case; None: the best one, if it helps
     """
     if following is None and made.best is not None and made.helps:
         following = made.best.experiment
@@ -164,7 +164,7 @@ def answered(axis: str, rate: float, made: Design, library: Library, following: 
 
 
 def _ask(library: Library, made: Design) -> str:
-    """What a person would have to change if no experiment can decide."""
+    """The changes that the user would have to make if no experiment can decide."""
     if made.helps:
         return ""
     own, other = made.beliefs[0].effects, made.beliefs[1].effects
@@ -176,7 +176,7 @@ def _ask(library: Library, made: Design) -> str:
 
 
 def with_needs(found: NextExperiment, models: Sequence[AxisModel]) -> NextExperiment:
-    """With what the experiment needs by any of some models: voltage, travel, speed and acceleration with the margin, and from where."""
+    """The answer with the experiment's requirements over all models: voltage, travel, speed, acceleration with the margin, and start position."""
     if found.experiment is None:
         return found
     limits, rate = found.limits, found.sampling_rate

@@ -1,7 +1,7 @@
-"""The experiment for precise parameters: one of them to a wanted interval (c-optimality), or all of them (D-optimality).
+"""The experiment for precise parameters: one of them to a given interval (c-optimality), or all of them (D-optimality).
 
-The covariance that a fit will report is predicted from the sensitivities of the simulated motion: the inverse of the information of the data at
-hand and of the experiment, and what laws that are not exact add however long it lasts (Fedorov, Theory of optimal experiments, 1972).
+The covariance of the later fit is predicted from the sensitivities of the simulated motion: the inverse of the information of the present
+data and the experiment, plus a contribution of inexact laws, which does not fall with time (Fedorov, Theory of optimal experiments, 1972).
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True)
 class Information:
-    """What an experiment tells of the parameters of a belief. each_second: (k, k); law: (k, k) covariance that does not fall with time."""
+    """Information of an experiment on a belief's parameters. each_second: (k, k); law: (k, k) covariance that does not fall with time."""
 
     each_second: FloatArray
     law: FloatArray
 
     def covariance(self, before: FloatArray, seconds: float) -> FloatArray:
-        """(k, k) of the coordinates after some seconds; before: (k, k) information of the data at hand."""
+        """(k, k) covariance of the coordinates after some seconds; before: (k, k) information of the present data."""
         return _inverse(before + FITTED * seconds * self.each_second) + self.law
 
 
 def information(belief: Belief, model: AxisModel, item: Recorded) -> Information:
-    """Of a recording that a model would make."""
+    """The information of a recording that a model would make."""
     least = expected_error(item, belief)
     layout = item.windows.layout
     weight = ((item.objective.lines > 0.0) / np.sqrt(least))[layout.band]
@@ -56,8 +56,8 @@ def information(belief: Belief, model: AxisModel, item: Recorded) -> Information
 
 @dataclass(frozen=True)
 class Sharpest:
-    """experiment: the best; None where none is needed, or within the limits; width: half of the 95 % interval that is expected, as ``Precision`` says
-    possible: whether that is as narrow as asked for; before: half of the interval by the data at hand
+    """experiment: the best; None if none is needed, or none is within the limits; width: expected half width of the 95 % interval (``Precision``)
+    possible: True if that reaches the wanted width; before: half width from the present data
     """
 
     experiment: Experiment | None
@@ -68,25 +68,25 @@ class Sharpest:
 
 @dataclass(frozen=True)
 class Precision:
-    """parameter: as ``gain`` or ``effect.parameter``; width: half of the 95 % interval, as a part of the value."""
+    """parameter: as ``gain`` or ``effect.parameter``; width: half width of the 95 % interval, fraction of the value."""
 
     parameter: str
     width: float
 
     def place(self, belief: Belief) -> int:
-        """Of the parameter among the coordinates."""
+        """Index of the parameter among the coordinates."""
         names = list(belief.model.values())
         if self.parameter not in names:
             raise BadInput("parameter", repr(self.parameter), ", ".join(names), "Choose one of these.")
         return names.index(self.parameter)
 
     def of_interval(self, found: Estimate) -> float:
-        """The same of an estimate of a fit."""
+        """The relative half width of an estimate of a fit."""
         half = 0.5 * (found.high - found.low)
         return half / abs(found.value) if found.value else math.inf
 
     def half_width(self, belief: Belief, covariance: FloatArray) -> float:
-        """Of the interval that a covariance of the coordinates means."""
+        """The relative half width for a covariance of the coordinates."""
         place = self.place(belief)
         spread = Z95 * math.sqrt(max(float(covariance[place, place]), 0.0))
         if belief.scale.positive[place]:
@@ -96,9 +96,9 @@ class Precision:
 
 
 def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: Precision, seed: int = 1) -> Sharpest:
-    """The experiment after which a parameter of a fit is known as well as asked for in the least time, or best where none gets there.
+    """The experiment that determines a parameter of a fit to the wanted width in the shortest time, or as well as possible.
 
-    The experiment is chosen by its information. How long it has to last is found by a rehearsal: the fit of a simulated recording with noise.
+    The experiment is chosen by its information. Its duration is found by a rehearsal: the fit of a simulated recording with noise.
     """
     before = target.of_interval(found.parameter(target.parameter))
     if before <= target.width:
@@ -130,7 +130,7 @@ def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: P
 
 
 def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: MachineLimits, target: Precision) -> float:
-    """Half of the interval that a fit reports of the data at hand and of a recording that the experiment would make, with the encoder's noise."""
+    """Half width from a fit of the present data and a simulated recording of the experiment, with the encoder's noise."""
     rate = data.sampling_rate
     motion = move(belief.model, rate, experiment.drive(rate, experiment.seconds, limits.start), COARSE)
     noise = data.floor.encoder * np.random.default_rng(0).standard_normal(motion.position.size)
@@ -140,7 +140,7 @@ def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: Ma
 
 
 def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Precision, seed: int) -> Sequence[Experiment]:
-    """Proposals, and neighbours of the best of them."""
+    """Proposals, and neighbours of the best ones."""
     rate, most = setting.layout.sampling_rate, limits.seconds - limits.ramp
     first = proposals(limits, rate, seed)
     judged: list[tuple[float, float, int, Experiment]] = []
@@ -153,7 +153,7 @@ def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Pre
 
 
 def informations(setting: Setting, belief: Belief, limits: MachineLimits, experiment: Experiment, draws: int = DRAWN) -> list[Information]:
-    """Of one experiment, for some draws; none where a draw would break a limit, or would not move."""
+    """Information of one experiment, for some draws; empty if a draw would exceed a limit or would not move."""
     found = []
     for model in belief.draws[:draws]:
         item = recorded(setting, experiment, model, limits.start)
@@ -164,7 +164,7 @@ def informations(setting: Setting, belief: Belief, limits: MachineLimits, experi
 
 
 def _needed(belief: Belief, found: Sequence[Information], target: Precision, most: float) -> tuple[float, float]:
-    """s until the mean interval over draws is as narrow as asked for, infinite if ``most`` do not suffice; and half its width there."""
+    """s until the mean interval over draws reaches the wanted width, infinite if ``most`` do not suffice; and the half width then."""
 
     if _width(belief, found, target, most) > target.width:
         return math.inf, _width(belief, found, target, most)
@@ -176,12 +176,12 @@ def _needed(belief: Belief, found: Sequence[Information], target: Precision, mos
 
 
 def _width(belief: Belief, found: Sequence[Information], target: Precision, seconds: float) -> float:
-    """Half of the 95 % interval after some seconds, in the mean over draws."""
+    """Half width of the 95 % interval after some seconds, mean over draws."""
     return float(np.mean([target.half_width(belief, item.covariance(belief.precision, seconds)) for item in found]))
 
 
 def volume(belief: Belief, found: Sequence[Information], seconds: float) -> float:
-    """Logarithm of the volume of the region in which the parameters lie after an experiment (D-optimality), in the mean over draws."""
+    """Logarithm of the volume of the parameters' confidence region after an experiment (D-optimality), mean over draws."""
     return float(np.mean([-0.5 * np.linalg.slogdet(belief.precision + FITTED * seconds * item.each_second)[1] for item in found]))
 
 

@@ -23,8 +23,8 @@ from xy_sysid.samples.block import FloatArray
 class Setting:
     """The measurement of an experiment: windows, noise floor and response.
 
-    layout: windows and bands; encoder: m; epsilon: part of the motion to which laws are trusted; recorded: s of each recording at hand
-    response: (bands,) |G|^2 of the machine to a force, as recorded (``greybox.floor``); None where nothing is recorded yet
+    layout: windows and bands; encoder: m; epsilon: fraction of the motion to which laws are trusted; recorded: s of each present recording
+    response: (bands,) |G|^2 of the machine to a force, as recorded (``greybox.floor``); None before any recording
     ramp: s in which an experiment fades in
     """
 
@@ -37,12 +37,12 @@ class Setting:
 
     @property
     def looked(self) -> float:
-        """s of an experiment that are simulated: as many steady ones, however slowly it fades in."""
+        """s of an experiment that are simulated: a fixed steady duration plus the fade-in."""
         return LOOKED - RAMP + self.ramp
 
     @staticmethod
     def of(data: AxisData, ramp: float = RAMP) -> Setting:
-        """As some data were seen, in windows for recordings as long as those that are simulated."""
+        """The setting of some data, with windows for recordings as long as the simulated ones."""
         recorded = tuple(size / data.sampling_rate for size in data.counts(early=False))
         longest = max(LOOKED, *recorded)
         layout = bands(data.sampling_rate, int(longest * data.sampling_rate / WINDOWS))
@@ -53,7 +53,7 @@ class Setting:
         )
 
     def shortest(self) -> float:
-        """s of an experiment that holds windows which judge it, when it is compared together with the recordings at hand.
+        """Least duration of an experiment, s, with held-out windows when it is compared together with the present recordings.
 
         The windows grow with the data (``greybox.axis_data``), so the time is found in steps.
         """
@@ -68,10 +68,10 @@ class Setting:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What would be recorded without noise.
+    """A recording without noise.
 
     windows: of the steady part; seconds: of it; velocity: (windows, lines) spectrum; objective: scores an error of it
-    trusted: part of the motion to which laws are trusted; moves: whether the encoder sees more than its noise
+    trusted: fraction of the motion to which laws are trusted; moves: True if the motion exceeds the encoder's noise
     """
 
     motion: Motion
@@ -84,13 +84,13 @@ class Recorded:
 
 
 def recorded(setting: Setting, experiment: Experiment, model: AxisModel, start: float, seconds: float | None = None) -> Recorded:
-    """What an experiment of some seconds would record if a model were true."""
+    """The recording of an experiment of some seconds if a model were true."""
     rate = setting.layout.sampling_rate
     return seen(setting, move(model, rate, experiment.drive(rate, setting.looked if seconds is None else seconds, start), COARSE))
 
 
 def seen(setting: Setting, motion: Motion) -> Recorded:
-    """A motion as an objective sees it, from the end of the ramp on."""
+    """A motion as an objective uses it, from the end of the fade-in on."""
     rate, length = motion.sampling_rate, setting.layout.length
     velocity = np.diff(motion.position) * rate
     first = min(round(setting.ramp * rate), max(velocity.size - length, 0))
@@ -118,7 +118,7 @@ def predicted(item: Recorded, model: AxisModel) -> NDArray[np.complex128]:
 
 
 def slopes(item: Recorded, belief: Belief, model: AxisModel, now: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(k, windows, lines) derivatives of what a model predicts, by the coordinates of its belief."""
+    """(k, windows, lines) derivatives of a model's prediction by the coordinates of its belief."""
     inner = belief.inner(model)
     found = []
     for k in range(inner.size):

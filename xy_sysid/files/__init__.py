@@ -1,11 +1,11 @@
 """Files that are not recordings: models, settings, effects, layouts.
 
-package_files:  where the files are that come with the package
+package_files:  location of the files that come with the package
 linear_models:  a transfer function for other tools
-models:         models of either kind, saved and loaded
+models:         models of both kinds, saved and loaded
 state:          the identifier's memory on disk
 ros_parameters: parameter files of ROS, checked and written
-effects:        effects from outside
-provenance:     where an answer comes from: versions, command, fingerprint of the data
+effects:        users' own effects
+provenance:     origin of an answer: versions, command, fingerprint of the data
 viewer_layouts: layouts for PlotJuggler and Foxglove
 """

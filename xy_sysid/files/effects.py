@@ -1,4 +1,4 @@
-"""Effects from outside: a Python file given by path, or a package's entry point of the group ``xy_sysid.effects``.
+"""Users' own effects: a Python file given by path, or a package's entry point of the group ``xy_sysid.effects``.
 
 A file defines ``EFFECT`` (or ``EFFECTS``, a sequence); an entry point names one. docs/your-own-effect.md walks through it.
 """
@@ -40,8 +40,8 @@ def from_file(path: Path) -> list[Effect]:
     with blamed(path):
         text = importlib.util.decode_source(path.read_bytes())
         total = hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
-        name = f"xy_sysid_user_{total[:16]}"  # by its text alone: compiled code on the disk asks for this module, wherever its file was
-        loader = TextLoader(text, str(path), {"__file__": str(path)})  # what runs is this text, whatever becomes of the file
+        name = f"xy_sysid_user_{total[:16]}"  # named by its text alone: cached compiled code imports this module, wherever the file was
+        loader = TextLoader(text, str(path), {"__file__": str(path)})  # run exactly this text, even if the file changes
         spec = importlib.util.spec_from_loader(name, loader)
         assert spec is not None
         module = sys.modules[name] = importlib.util.module_from_spec(spec)

@@ -1,4 +1,4 @@
-"""Files of designed experiments: written by ``xy-sysid next``, read by the node that carries them out."""
+"""Files of designed experiments: written by ``xy-sysid next``, read by the node that runs them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def document(found: NextExperiment) -> dict[str, Any]:
-    """What the file of an experiment holds. Raises BadInput where there is none."""
+    """The content of an experiment's file. Raises BadInput without an experiment."""
     if found.experiment is None or found.needs is None:
         raise BadInput("experiment", "none", "one that helps", found.sentence)
     made = document_of(found.axis, found.sampling_rate, found.experiment, found.needs, found.limits.units)
@@ -28,10 +28,10 @@ def document(found: NextExperiment) -> dict[str, Any]:
 
 
 def write_experiment(path: Path, found: NextExperiment) -> None:
-    """The file of an experiment, for parameter ``experiment`` of the excitation node."""
+    """Write the file of an experiment, for parameter ``experiment`` of the excitation node."""
     exact = document(found)
     told = _quoted(exact)
-    told["experiment"]["needs"] = exact["experiment"]["needs"]  # not rounded up beyond the limit
+    told["experiment"]["needs"] = exact["experiment"]["needs"]  # not rounded to a value above the limit
     text = yaml.safe_dump(told, sort_keys=False, width=120, allow_unicode=True)
     units = found.limits.units
     head = (
@@ -43,7 +43,7 @@ def write_experiment(path: Path, found: NextExperiment) -> None:
 
 
 def read_experiment(settings: ExcitationSettings, path: Path) -> Taken:
-    """Settings with the experiment of a file, and where it may begin.
+    """Settings with the experiment of a file, and its allowed start positions.
 
     Raises BadInput for a file that cannot be read, or that asks for more than the settings allow.
     """

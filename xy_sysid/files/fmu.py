@@ -1,4 +1,4 @@
-"""A functional mock-up unit as one file: description, sources, and a binary for this machine where a C compiler is found."""
+"""A functional mock-up unit as one file: description, sources, and a binary for this machine if a C compiler is found."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from pathlib import Path
 from xy_sysid.bags.atomic import whole
 
 PLACE = "binaries/linux64"
-OPTIONS = ("-shared", "-fPIC", "-O2", "-std=c99", "-ffp-contract=off", "-fvisibility=hidden")  # no fused sums: the same numbers on any processor
+OPTIONS = ("-shared", "-fPIC", "-O2", "-std=c99", "-ffp-contract=off", "-fvisibility=hidden")  # no fused operations
 LONGEST = 120.0  # s for a compiler
 
 
 def write_fmu(path: Path, name: str, files: Mapping[str, str]) -> str:
-    """Write the archive; returns what is missing in it: empty, or why there is no binary. Raises OSError if it cannot be written."""
+    """Write the archive; returns why it has no binary, or an empty text. Raises OSError if it cannot be written."""
     binary, missing = _binary(name, files)
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:

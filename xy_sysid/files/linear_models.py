@@ -1,4 +1,4 @@
-"""A fitted model for other tools: YAML that reloads, .mat for MATLAB's tf()."""
+"""A fitted model for other programs: YAML that can be loaded again, .mat for MATLAB's tf()."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from xy_sysid.units import over
 
 FORMAT = "xy_sysid model 1"
 Hold = Literal["zoh", "none"]
-LONGEST_DELAY = 1e3  # s; no axis answers later
-MOST_COEFFICIENTS = 64  # of a polynomial; the roots of longer ones are lost in rounding
+LONGEST_DELAY = 1e3  # s; no axis has a longer delay
+MOST_COEFFICIENTS = 64  # of a polynomial; with more, rounding makes the roots meaningless
 
 
 def model_document(fits: dict[str, Fit], provenance: dict[str, Any]) -> dict[str, Any]:
-    """Everything about the models that is worth keeping, in plain types."""
+    """The document of the models, in plain types."""
     return {"format": FORMAT, "provenance": provenance, "axes": {axis: _axis(fit) for axis, fit in fits.items()}}
 
 
@@ -79,7 +79,7 @@ Quoting.add_representer(str, _string)
 
 @dataclass(frozen=True, slots=True)
 class SavedModel:
-    """A model as a file keeps it; hold: how its input behaves between samples; data: SHA-256 of what it was fitted to, as far as known."""
+    """A model from a file; hold: behaviour of the input between samples; data: SHA-256 of the data in its fit, if known."""
 
     tf: TransferFunction
     hold: Hold
@@ -87,7 +87,7 @@ class SavedModel:
 
 
 def read_saved(path: Path) -> dict[str, SavedModel]:
-    """The models of a file with what is known of them, by axis; raises BadRecording or BadInput in one line if it is not one."""
+    """The models of a file by axis; raises BadRecording or BadInput in one line for another file."""
     document = model_file(path)
     origin = document.get("provenance")
     found: dict[str, SavedModel] = {}
@@ -101,14 +101,14 @@ def read_saved(path: Path) -> dict[str, SavedModel]:
 
 
 def fitted_to(origin: Any, axis: str) -> tuple[str, ...]:
-    """SHA-256 of each recording that the model of an axis was fitted to, from the provenance of its file; empty if it does not say."""
+    """SHA-256 of each recording in the fit of an axis's model, from the provenance of its file; empty if unknown."""
     digests = origin.get("data_sha256") if isinstance(origin, dict) else None
     told = digests.get(axis) if isinstance(digests, dict) else None
     return tuple(str(item) for item in told) if isinstance(told, list) else (str(told),) if told else ()
 
 
 def model_file(path: Path, formats: tuple[str, ...] = (FORMAT,)) -> dict[str, Any]:
-    """The document of a model file of one of these formats; raises BadRecording in one line if it is not one."""
+    """The document of a model file of one of these formats; raises BadRecording in one line for another file."""
     text = unsealed(path, text_of(path, "a model"))
     try:
         problem = too_much(text)

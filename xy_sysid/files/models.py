@@ -30,10 +30,10 @@ Model = LinearModel | PhysicalModel
 
 
 def save(model: Model | Mapping[str, Model], path: Path | str, axis: str = "", *, force: bool = False) -> None:
-    """Write a model as YAML that ``load_model`` and the commands read: whole or not at all.
+    """Write a model as YAML that ``load_model`` and the commands read; the file is written completely or not at all.
 
-    model: of one axis, or {axis: model}, all of the same kind; axis: its name where the model does not know it
-    Raises BadInput if the file is there and not ``force``, BadRecording if it cannot be written.
+    model: of one axis, or {axis: model}, all of the same kind; axis: its name, if the model does not contain it
+    Raises BadInput if the file exists and ``force`` is False, BadRecording if it cannot be written.
     """
     path = Path(path)
     free("file", path, force, "say force=True")
@@ -110,7 +110,7 @@ def _written(model: AxisModel, units: Units, parameters: dict[str, Any], errors:
 
 
 def write_axis_models(path: Path, fits: Mapping[str, GreyboxFit], provenance: Mapping[str, Any]) -> None:
-    """As YAML that ``read_models`` reads. Raises BadRecording if it cannot be written."""
+    """Write YAML that ``read_models`` reads. Raises BadRecording if it cannot be written."""
     text = yaml.dump(axis_document(fits, provenance), Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)
     write_text(path, sealed(text))
 
@@ -132,7 +132,7 @@ def write_axis_mat(path: Path, fits: Mapping[str, GreyboxFit]) -> None:
 
 
 def read_models(path: Path, library: Library) -> Mapping[str, Model]:
-    """The models of a file of either kind, by axis; raises BadRecording or BadInput in one line if it is none."""
+    """The models of a file of either kind, by axis; raises BadRecording or BadInput in one line for another file."""
     document = model_file(path, (FORMAT, AXIS_FORMAT))
     if document["format"] == FORMAT:
         return {axis: LinearModel(item.tf, item.hold, axis, item.data) for axis, item in read_saved(path).items()}
@@ -149,14 +149,14 @@ def read_models(path: Path, library: Library) -> Mapping[str, Model]:
 
 
 def _rate(origin: Any, axis: str) -> float | None:
-    """Hz of the recording that an axis was fitted to, from the provenance of its file; None if it does not say."""
+    """Hz of the recording in the fit of an axis, from the provenance of its file; None if unknown."""
     told = origin.get("sampling_rate_hz") if isinstance(origin, dict) else None
     told = told.get(axis) if isinstance(told, dict) else told
     return float(told) if isinstance(told, int | float) and 0.0 < told < math.inf else None
 
 
 def _known(written: Mapping[str, Any], model: AxisModel) -> tuple[Estimate, ...]:
-    """The parameters with the intervals that the file gives; none if one of them lacks it."""
+    """The parameters with the file's intervals; empty if one of them has none."""
     found = []
     for name, value in model.values().items():
         item = written.get(name, {})

@@ -1,4 +1,4 @@
-"""Where the files that come with the package are: the source tree, or the share folder of an installation."""
+"""Location of the files that come with the package: the source tree, or the share folder of an installation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def share(start: Path | None = None) -> Path:
     A source tree (an editable install, a colcon build with symlinks) has them beside the package; an installation
     (pip, colcon) has them in ``share/xy_sysid`` of the prefix that holds the package.
 
-    Raises BadInput when neither is there.
+    Raises BadInput if neither exists.
     """
     package = (start or Path(__file__)).resolve().parents[1]
     if (package.parent / "package.xml").is_file():
@@ -29,7 +29,7 @@ def share(start: Path | None = None) -> Path:
 def find(name: str, folder: str = "config") -> Path:
     """A file by path, or by name among the files that come with the package.
 
-    Raises BadInput that lists the names there are.
+    Raises BadInput that lists the existing names.
     """
     given = Path(name).expanduser()
     if given.is_file():

@@ -1,4 +1,4 @@
-"""Where an answer comes from: versions, command, and a fingerprint of the data."""
+"""Origin of an answer: versions, command, and a fingerprint of the data."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from xy_sysid.samples.recording import Recording
 
 
 def fingerprint(recording: Recording, axis: str) -> str:
-    """SHA-256 of the samples of an axis, of the longest stretch without a gap; empty if there is none."""
+    """SHA-256 of an axis's samples in the longest run without a gap; empty if there is none."""
     return recording.run(axis).digest if len(recording) else ""
 
 
@@ -28,7 +28,7 @@ def provenance(source: str, recording: Recording) -> dict[str, Any]:
 
 
 def provenance_of_response(source: str) -> dict[str, Any]:
-    """The same of a file without samples."""
+    """Provenance of a file without samples."""
     from importlib.metadata import PackageNotFoundError, version
 
     versions = {"python": platform.python_version()}
@@ -41,5 +41,5 @@ def provenance_of_response(source: str) -> dict[str, Any]:
 
 
 def _printable(text: str) -> str:
-    """A file's name may hold bytes that are no text."""
+    """The text with invalid bytes of a file name replaced."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")

@@ -1,6 +1,6 @@
-"""ROS parameter files: checked against the settings before any node sees them, and written from the settings.
+"""ROS parameter files: checked against the settings before a node reads them, and written from the settings.
 
-Fed with text, gives values; reading the file is for the caller.
+Text in, values out; the caller reads the file.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ BARE_BOOLEANS = re.compile(r"y|n|yes|no|on|off|true|false", re.IGNORECASE)
 
 
 def load(text: str, where: str) -> Any:
-    """The YAML document; raises BadInput for text that is no YAML, and for a bare ``y`` as a name, which ROS reads as true."""
+    """The YAML document; raises BadInput for invalid YAML, and for a bare ``y`` as a name, which ROS reads as true."""
     try:
         problem = too_much(text)
         if problem:
@@ -78,11 +78,11 @@ def flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return found
 
 
-WITH_AXES = ("excitation", "identifier", "diagnoser")  # nodes with the parameter axes
+WITH_AXES = ("excitation", "identifier", "diagnoser")  # nodes with the parameter ``axes``
 
 
 def _axes(node: str, values: Mapping[str, Any], where: str) -> list[str]:
-    """The names in ``axes``; raises BadInput if it is no list of names."""
+    """The names in ``axes``; raises BadInput if it is not a list of names."""
     axes = values.get("axes", list(AXES))
     if node not in WITH_AXES or not isinstance(axes, list) or not axes or not all(isinstance(axis, str) and axis for axis in axes):
         raise BadInput(f"{where}: axes", repr(axes), 'a list of names like ["x", "y"]', "Change it and try again.")
@@ -107,9 +107,9 @@ def checked(node: str, values: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 
 def parameters(text: str, where: str, nodes: Mapping[str, str] | None = None) -> dict[str, dict[str, Any]]:
-    """Parameters of every node that a ROS parameter file speaks of, by node name.
+    """Parameters of every node in a ROS parameter file, by node name.
 
-    ``nodes`` says which kind each node name is, for nodes that were given names of their own. A section ``/**`` is for
+    ``nodes`` maps node names to kinds, for nodes with names of their own. A section ``/**`` is for
     every node, and each of its names must be known to at least one. Raises BadInput.
     """
     kinds = dict(nodes or {name: name for name in NODES})
@@ -139,7 +139,7 @@ def parameters(text: str, where: str, nodes: Mapping[str, str] | None = None) ->
 
 
 def default_text() -> str:
-    """The parameter file with every knob of every node at its default, meaning and unit beside it."""
+    """The parameter file with every setting of every node at its default, with meaning and unit."""
     lines = [
         "# Every parameter of every node, at its default. Units are SI.",
         '# Made from xy_sysid/settings.py: python -m xy_sysid.files.ros_parameters. Keep "x" and "y" quoted: a bare y means true.',

@@ -1,4 +1,4 @@
-"""The first line of a model file holds the checksum of the rest, so a cut or changed file is detected."""
+"""The first line of a model file holds the checksum of the rest, so that a truncated or changed file is detected."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ HINT = "after a change by hand, delete this line"
 
 
 def sealed(text: str) -> str:
-    """The text behind a line with its sum; for YAML, that line is a comment."""
+    """The text after a line with its checksum; for YAML, that line is a comment."""
     return f"# sha256 of all lines below: {_sum(text)} ({HINT})\n{text}"
 
 
 def unsealed(path: Path, text: str) -> str:
-    """The text without its first line, if that was a sum.
+    """The text without its first line, if that was a checksum.
 
-    Raises BadRecording if the sum is another, or if a file of an older version, which has none, ends inside a line.
+    Raises BadRecording for a wrong checksum, or if a file of an older version without one ends inside a line.
     """
     found = LINE.match(text)
     if found is None:

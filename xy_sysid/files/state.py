@@ -1,4 +1,4 @@
-"""The identifier's memory on disk: written whole or not at all, so that a kill in the middle loses nothing."""
+"""The identifier's memory on disk: written completely or not at all, so that a kill during writing loses nothing."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ DAMAGED = (
 
 
 def save_state(path: Path, state: State) -> None:
-    """Write beside the old file, then put it in its place. Raises BadRecording if it cannot be written."""
+    """Write a temporary file, then replace the old one. Raises BadRecording if it cannot be written."""
     arrays: dict[str, Any] = dict(state)
     with whole(path) as part, part.open("wb") as file:
         np.savez(file, **arrays)
 
 
 def load_state(path: Path) -> State:
-    """What was saved; raises BadRecording if the file is none of ours."""
+    """The saved state; raises BadRecording if the file is not a state file."""
     try:
         regular_file(path)
         with np.load(path, allow_pickle=False) as file:
@@ -51,7 +51,7 @@ def load_state(path: Path) -> State:
 
 
 def set_aside(path: Path) -> Path:
-    """Keep a state that cannot be used under another name, so that it is neither used nor lost."""
+    """Rename a state that cannot be used, so that it is neither used nor lost."""
     aside = path.with_name(path.name + ".unusable")
     path.replace(aside)
     return aside

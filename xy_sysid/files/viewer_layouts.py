@@ -1,4 +1,4 @@
-"""Layouts that open our topics in PlotJuggler and Foxglove, made from the columns and names of the messages.
+"""Layouts that open the topics of this package in PlotJuggler and Foxglove, made from the columns and names of the messages.
 
     python -m xy_sysid.files.viewer_layouts plotjuggler > config/plotjuggler.xml
     python -m xy_sysid.files.viewer_layouts foxglove > config/foxglove.json
@@ -24,7 +24,7 @@ from xy_sysid.samples.block import columns
 NAMESPACE = "/xy"
 AXES = ("x", "y")
 COLOURS = ("#2f7fd0", "#d9691e", "#1a9a6c", "#9a62d0")
-LARGEST_BLOCK = 400  # numbers in a block of samples that PlotJuggler keeps; a response has thousands and is left out
+LARGEST_BLOCK = 400  # numbers in a block of samples that PlotJuggler keeps; a response has thousands and is omitted
 
 SAMPLES = columns(AXES).split(",")
 STREAMS = (("voltage", "V"), ("position", "m"))
@@ -55,7 +55,7 @@ def plotjuggler() -> str:
 
 
 def _tab(tabs: ET.Element, name: str, plots: Sequence[Sequence[str]]) -> None:
-    """One plot below the other, each with its curves."""
+    """Add plots below each other, each with its curves."""
     container = ET.SubElement(ET.SubElement(tabs, "Tab", containers="1", tab_name=name), "Container")
     sizes = ";".join(f"{1 / len(plots):.6f}" for _ in plots)
     splitter = ET.SubElement(container, "DockSplitter", orientation="-", count=str(len(plots)), sizes=sizes)
@@ -110,12 +110,12 @@ def _plot(title: str, paths: Sequence[tuple[str, str]], over: str = "") -> dict[
 
 
 def _made(topic: str) -> str:
-    """Where a script puts the columns of a topic."""
+    """The topic on which a script publishes the columns of a topic."""
     return f"/studio_script{NAMESPACE}/{topic}"
 
 
 def _script(topic: str, names: Sequence[str]) -> str:
-    """TypeScript that turns the rows of a topic into columns; a frequency comes as its logarithm, too."""
+    """TypeScript that turns the rows of a topic into columns; for a frequency it also gives the logarithm."""
     fields = [f"    {name}: column({place})," for place, name in enumerate(names)]
     kinds = [f"{name}: number[];" for name in names]
     if names[0] == "frequency":
@@ -140,7 +140,7 @@ def _script(topic: str, names: Sequence[str]) -> str:
 
 
 def _stacked(direction: str, names: Sequence[Any]) -> Any:
-    """A split of the window, nested to the second side."""
+    """A split of the window; further splits are nested in the second half."""
     if len(names) == 1:
         return names[0]
     return {"direction": direction, "first": names[0], "second": _stacked(direction, names[1:]), "splitPercentage": round(100 / len(names), 1)}

@@ -1,4 +1,4 @@
-"""The folder of a walk to a settled diagnosis: a bag of each recording, the file of each experiment, and what was decided when.
+"""The folder of a series of experiments towards a settled diagnosis: a bag per recording, a file per experiment, and all decisions.
 
 0, 1, 2, ... are the bags; next_1.yaml, ... the experiments; walk.json holds the plan and every step.
 """
@@ -28,7 +28,7 @@ from xy_sysid.settings import AnySettings, Settings
 
 NAME = "walk.json"
 LONGEST = 1 << 24  # bytes of it; a step takes some thousand
-SHOWN = 60  # characters of a value that a refusal shows
+SHOWN = 60  # characters of a value shown in an error message
 UNKNOWN = "Give the folder of a walk: xy-sysid demo --settle and the page make them."
 
 
@@ -51,7 +51,7 @@ def step_document(step: WalkStep) -> dict[str, Any]:
 
 
 def plan_document(plan: WalkPlan) -> dict[str, Any]:
-    """A plan as JSON; a limit that there is not is left out."""
+    """A plan as JSON, without limits that are not set."""
     limits = {name: value for name, value in asdict(plan.limits).items() if value != math.inf}
     return {
         "axis": plan.axis,
@@ -63,7 +63,7 @@ def plan_document(plan: WalkPlan) -> dict[str, Any]:
 
 
 class _Plan(Settings):
-    """A plan as JSON has it."""
+    """A plan as stored in JSON."""
 
     axis: str
     limits: MachineLimits
@@ -73,7 +73,7 @@ class _Plan(Settings):
 
 
 class _Walk(Settings):
-    """What ``NAME`` holds."""
+    """The content of the file ``NAME``."""
 
     plan: _Plan
     steps: list[dict[str, Any]]
@@ -89,7 +89,7 @@ def _plan(told: _Plan, library: Library) -> WalkPlan:
 
 
 def _read(kind: type[AnySettings], text: str, where: str) -> AnySettings:
-    """What a text of JSON holds. Raises BadInput that names the first key with a fault."""
+    """The content of a JSON text. Raises BadInput that names the first wrong key."""
     try:
         return kind.model_validate_json(text, strict=True)
     except ValidationError as error:
@@ -104,14 +104,14 @@ def write_walk(folder: Path, plan: WalkPlan, done: Iterable[dict[str, Any]]) -> 
 
 
 def run_of(path: Path, axis: str) -> Run:
-    """The longest stretch of an axis without a gap in one of the bags."""
+    """The longest gap-free run of an axis in one of the bags."""
     return load(path).run(axis)
 
 
 def replayed(folder: Path, library: Library = STANDARD) -> list[tuple[dict[str, Any], dict[str, Any]]]:
-    """Each step of a walk as it was decided, and as its bags decide it now; the same pairs where nothing has changed.
+    """Each step of a walk as decided then, and as decided now from its bags; both are equal if nothing has changed.
 
-    A step that was stopped is compared with the step that would have followed. Raises BadInput for a folder that is none.
+    A stopped step is compared with the step that would have followed. Raises BadInput for a folder without a walk.
     """
     try:
         text = text_of(folder / NAME, "the plan of a walk", LONGEST)

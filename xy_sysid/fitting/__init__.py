@@ -1,18 +1,18 @@
 """Transfer functions from frequency responses, with their uncertainty and verdicts.
 
-structure, problem:           what to look for; the lines to be fitted
-basis, linear, damped:        polynomials that stay well conditioned, least squares, steps
-plan, prediction, leakage:    what the spectra are expected to show
-lls, iwls, nlls, ml, nllsfdi: estimators: one a file, all with the signature of ``identify``
-identify:                     the one to trust by default
-covariance, intervals:        how sure a fit is
-finish, result:               what a fit says
-modes:                        poles only, the short way
+structure, problem:           the model structure; the lines to be fitted
+basis, linear, damped:        well-conditioned polynomials, least squares, damped steps
+plan, prediction, leakage:    the expected spectra of a model
+lls, iwls, nlls, ml, nllsfdi: estimators: one per file, all with the signature of ``identify``
+identify:                     the default estimator
+covariance, intervals:        uncertainty of a fit
+finish, result:               content of a fit
+modes:                        poles only, a faster path
 model_orders, choose_orders:  which orders the data support, and the default orders of a fit
-verdicts:                     what to believe
+verdicts:                     checks of a fit
 check_on_data:                a given model against other data
-of_recording:                 the whole way of a recording, axis by axis
-of_run:                       the same of one run, one call each: response, model
+of_recording:                 from a full recording to responses, axis by axis
+of_run:                       the same for one run, one call per step: response, model
 """
 
 from __future__ import annotations

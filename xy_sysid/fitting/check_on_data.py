@@ -15,12 +15,12 @@ from xy_sysid.response.h1 import divisor
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import over, position_of, told
 
-AT_THE_FLOOR = 1.3  # rms residual in sigma up to which a model that was fitted elsewhere is as good as noise allows
+AT_THE_FLOOR = 1.3  # rms residual in sigma up to which a model from other data counts as consistent with the noise
 
 
 @dataclass(frozen=True, slots=True)
 class ModelCheck:
-    """How a model does on data that it has not seen.
+    """Result of a model on held-out data.
 
     frequency, measured, predicted: (m,) trusted lines, Hz; the data; the model through hold and window
     sigmas: (m,) |measured - predicted| in standard deviations of the measurement
@@ -43,7 +43,7 @@ class ModelCheck:
 
     @property
     def holds(self) -> bool:
-        """The residual is at the noise floor."""
+        """True if the residual is at the noise floor."""
         return self.rms_sigma <= AT_THE_FLOOR
 
     def __repr__(self) -> str:
@@ -51,7 +51,7 @@ class ModelCheck:
 
 
 def through_window(tf: TransferFunction, frf: FrequencyResponse, hold: Literal["zoh", "none"] = "zoh") -> ComplexArray:
-    """(m,) what a measurement like ``frf`` is expected to give of this model: held, sampled, blurred by the window."""
+    """(m,) expected response of this model in a measurement like ``frf``: with hold, sampling and the window's smoothing."""
     total = np.zeros(len(frf), dtype=np.complex128)
     for offset, weight in zip(frf.kernel_offset, frf.kernel_weight, strict=True):
         at = frf.frequency + offset
@@ -74,11 +74,11 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
         raise BadInput("number of trusted lines", 0, "1 or more", "Record longer, excite more, or widen the band.")
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         predicted = through_window(tf, lines, hold)
-        usable = bool(np.isfinite(np.sum(np.abs(predicted / lines.response) ** 2)))  # a square that overflows is no number either
+        usable = bool(np.isfinite(np.sum(np.abs(predicted / lines.response) ** 2)))  # a square that overflows is not a number either
     if not usable:
         raise BadInput("response of the model", "not finite", "finite in the band of the recording", "Check the coefficients of the model.")
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model diverges, and the result says so
             simulated = simulation_error(tf, frf.sampling_rate, u, y, hold=hold)
     except BadInput:
         simulated = None

@@ -1,4 +1,4 @@
-"""Orders of a response that does not fall at its highest lines: a controller or a filter, and no machine from its input to its motion.
+"""Orders of a response that does not fall at its highest lines: a controller or a filter, not a machine from input to motion.
 
 As many zeros as poles, from the simplest upward, with and without delay. An order is taken if it shortens the description clearly; the cost
 counts in units of what the richest stable model leaves, as in ``choose_orders``.
@@ -19,12 +19,12 @@ from xy_sysid.fitting.structure import Structure
 from xy_sysid.response.frf import FrequencyResponse
 
 MOST = 6  # poles
-TOP = 10  # lines at the high end whose slope tells
+TOP = 10  # lines at the high end for the slope
 FALLS = -0.5  # slope of magnitude over frequency, both logarithmic: between a response that is level and one that falls with a pole
 
 
 def is_level(frf: FrequencyResponse) -> bool:
-    """Whether the magnitude falls by less than half a pole at the highest lines that are trusted."""
+    """True if the magnitude falls by less than half a pole at the highest trusted lines."""
     lines = frf.select(frf.trusted) if bool(np.any(frf.trusted)) else frf
     if len(lines) < TOP:
         return False
@@ -34,7 +34,7 @@ def is_level(frf: FrequencyResponse) -> bool:
 
 
 def choose_level(frf: FrequencyResponse, family: Structure) -> Choice:
-    """The orders that a level response tells; of ``family`` everything but orders and delay is kept. Raises BadInput if nothing stable is found."""
+    """The orders for a level response; everything but orders and delay is kept from ``family``. Raises BadInput if no stable model is found."""
     family = replace(family, weighting="sigma", domain="s")
     tried = []
     for order in range(max(family.integrators, 1), MOST + 1):

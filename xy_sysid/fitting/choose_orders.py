@@ -25,18 +25,18 @@ from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.units import derivative_of
 
 STEPS = ((0, 1), (2, 2), (0, 2), (1, 2), (4, 4))  # zeros and poles added at once; two pairs, where one alone finds no minimum
-MOST_POLES = 9  # beside the integrators
-HALF = 0.5  # of the misfit near what a step adds that it may leave
-NEAR = 1.4  # times and over the frequencies added: there the misfit is counted
-LIGHT = 0.7  # damping above which a pair is no resonance
-NUMBERS_EACH = 4.0  # independent numbers that every parameter of a step up needs
+MOST_POLES = 9  # in addition to the integrators
+HALF = 0.5  # fraction of the misfit near an added mode that may remain
+NEAR = 1.4  # factor below and above the added frequencies within which the misfit is counted
+LIGHT = 0.7  # damping above which a pair is not a resonance
+NUMBERS_EACH = 4.0  # independent numbers that each parameter of a step needs
 WIDEST = 0.1  # relative standard error, including misfit, of a frequency that counts as determined
-FAR_ABOVE = 3.0  # times the band's end beyond which a rigid body's pole is not seen at all
+FAR_ABOVE = 3.0  # factor above the band's end beyond which a rigid body's pole is not visible
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The fit of the orders chosen, the structures tried (best first), and the reason in words."""
+    """The fit of the chosen orders, the tested structures (best first), and the reason in words."""
 
     fit: Fit
     tried: tuple[OrderTrial, ...]
@@ -45,7 +45,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """A richer fit, the pole modes that it adds, and why it is not to be believed (empty if it is)."""
+    """A richer fit, the pole modes that it adds, and why it is not plausible (empty if it is)."""
 
     fit: Fit
     added: tuple[Mode, ...]
@@ -53,9 +53,9 @@ class _Step:
 
 
 def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> Choice:
-    """The orders that the data tell; of ``family`` everything but the orders is kept, with sigma as weight in the s domain.
+    """The orders that the data support; everything but the orders is kept from ``family``, with sigma as weight in the s domain.
 
-    thorough: look for more, too, when noise already explains what is there. Raises BadInput for too few lines even for a rigid body.
+    thorough: test higher orders even if noise explains the residual. Raises BadInput for too few lines for a rigid body.
     """
     family = replace(family, weighting="sigma", domain="s")
     rigid = _rigid(frf, family)
@@ -89,9 +89,9 @@ def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> 
 
 
 def choose_among(frf: FrequencyResponse, families: Sequence[Structure]) -> Choice:
-    """The orders and the family that the data tell: a mass that floats (two integrators of its position), with drag (one), or on a spring (none).
+    """The orders and the family that the data support: a free mass (two integrators of its position), with drag (one), or on a spring (none).
 
-    An acceleration shows neither by a slope, as a position does, so each is tried. Raises BadInput as ``choose``.
+    The slope of an acceleration does not show the family, unlike that of a position, so each is tested. Raises BadInput as ``choose``.
     """
     choices = [choose(frf, family) for family in families]
     scale = max(1.0, min(excess(choice.fit) for choice in choices))
@@ -99,13 +99,13 @@ def choose_among(frf: FrequencyResponse, families: Sequence[Structure]) -> Choic
 
 
 def excess(fit: Fit) -> float:
-    """Cost over what noise alone lets expect; 1 where that is not known."""
+    """Cost divided by its expected value for noise alone; 1 if that is unknown."""
     return fit.cost / fit.expected_cost if fit.expected_cost > 0.0 else 1.0
 
 
 def _rigid(frf: FrequencyResponse, family: Structure) -> Fit:
-    """A mass with drag (or on a spring, without integrators) and delay; one pole less where the last is not seen, or nothing stable is found."""
-    floats = family.integrators == 2 and derivative_of(frf.output_unit) == 2  # a mass without drag answers a force by its acceleration
+    """A mass with drag (or on a spring, without integrators) and delay; with one pole less if the last is not visible, or no stable fit is found."""
+    floats = family.integrators == 2 and derivative_of(frf.output_unit) == 2  # a mass without drag responds to a force with its acceleration
     order = 2 if floats else max(2, family.integrators + 1)
     rigid = identify(frf, replace(family, numerator_order=0, denominator_order=order))
     if floats:
@@ -127,7 +127,7 @@ def _steps(frf: FrequencyResponse, now: Fit) -> list[_Step]:
             continue
         try:
             fit = identify(frf, structure)
-        except (BadInput, ZeroDivisionError, np.linalg.LinAlgError):  # beyond what numbers can hold
+        except (BadInput, ZeroDivisionError, np.linalg.LinAlgError):  # outside the range of floating-point numbers
             continue
         if fit.converged:
             added = _added(now.tf.pole_modes(), fit.tf.pole_modes(), poles)
@@ -136,7 +136,7 @@ def _steps(frf: FrequencyResponse, now: Fit) -> list[_Step]:
 
 
 def _added(before: tuple[Mode, ...], after: tuple[Mode, ...], poles: int) -> tuple[Mode, ...]:
-    """What so many poles more have brought: the lightest pairs that are new, or the real pole that is; fewer, if there is no such thing."""
+    """The modes of additional poles: the least damped new pairs, or the new real pole; fewer if there are none."""
     pairs = poles > 1
 
     def alike(mode: Mode) -> bool:
@@ -150,7 +150,7 @@ def _added(before: tuple[Mode, ...], after: tuple[Mode, ...], poles: int) -> tup
 
 
 def _doubt(now: Fit, fit: Fit, added: tuple[Mode, ...], poles: int) -> str:
-    """Why a richer fit is not physical, or not determined by the data; empty if nothing is wrong."""
+    """Why a richer fit is not physical, or not determined by the data; empty if it is both."""
     low, high = float(fit.frequency[0]), float(fit.frequency[-1])
     if not fit.tf.is_stable:
         return "it is unstable"
@@ -176,12 +176,12 @@ def _doubt(now: Fit, fit: Fit, added: tuple[Mode, ...], poles: int) -> str:
 
 
 def fit_resolution(fit: Fit) -> float:
-    """Hz between the lines of a fit."""
+    """Spacing of the lines of a fit, Hz."""
     return float(np.min(np.diff(fit.frequency))) if fit.frequency.size > 1 else 0.0
 
 
 def _misfit(fit: Fit, richer: Fit, added: tuple[Mode, ...]) -> float:
-    """Cost beyond noise near the modes added, and near the zeros that stand beside them; all of it for a single pole."""
+    """Cost above noise near the added modes, and near the zeros next to them; all of it for a single pole."""
     parts = 0.5 * np.abs(fit.weight * (fit.measured - fit.response)) ** 2
     noise = fit.expected_cost / max(len(parts), 1)
     if all(abs(mode.damping) >= 1.0 for mode in added):

@@ -21,9 +21,9 @@ from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.response.h1 import smoothed
 from xy_sysid.samples.block import FloatArray
 
-BLOCK = 32  # lines whose median noise stands for a line that leakage hides
-DOUBT = 3.0  # noise is seen on its own line when it is so many standard deviations of sigma^2 above the leakage
-RANK = 1e-11  # a direction seen less than this part of the best one is not estimated: its variance is of that size at least
+BLOCK = 32  # lines whose median noise replaces that of a line dominated by leakage
+DOUBT = 3.0  # noise is estimated on its own line if it is this many standard deviations of sigma^2 above the leakage
+RANK = 1e-11  # a direction with a smaller relative singular value is not estimated: its variance is at least that large
 
 
 def covariance(task: Problem, at: Point, table: FloatArray) -> tuple[FloatArray, float, float]:
@@ -63,7 +63,7 @@ def _leaky(frf: FrequencyResponse) -> bool:
 
 
 def _freedom(frf: FrequencyResponse) -> float:
-    """Degrees of freedom of each line's sigma^2: the windows, and the lines that it was averaged over."""
+    """Degrees of freedom of each line's sigma^2: from the windows and the averaged lines."""
     near = frf.line_correlation[1 : frf.smoothing]
     independent = frf.smoothing / (1.0 + 2.0 * float(np.sum((1.0 - np.arange(1, near.size + 1) / frf.smoothing) * near)))
     return 2.0 * (frf.averages - 1.0) * independent
@@ -88,7 +88,7 @@ def _noise(total: FloatArray, leaks: FloatArray, after: FloatArray, freedom: flo
 
 
 def _places(task: Problem) -> NDArray[np.int64]:
-    """(m,) each line's number on the grid of lines, from 0."""
+    """(m,) index of each line on the grid of lines, from 0."""
     frf = task.frf
     if (frf.line_correlation.size == 1 and not _leaky(frf)) or not frf.resolution > 0:
         return np.arange(len(frf))
@@ -110,7 +110,7 @@ def error_covariance(task: Problem, at: Point, sigma: FloatArray, place: NDArray
         near = unblurred(model(task, at), at.b, at.a, at.delay)
         bends, single = _bends(near, plan.index, plan.kernel, plan.after, plan.seen, place, frf.kernel_amplitude.size)
         straight, folded = leakage(frf, bends)
-        single -= straight[0].real  # what leakage adds to the scatter
+        single -= straight[0].real  # contribution of leakage to the scatter
         share = smoothed(single, frf.smoothing)
         noise[place] = _noise(sigma**2, share[place] / max(frf.averages - 1.0, 1.0), np.abs(plan.after) ** 2, 2.0 * (frf.averages - 1.0))
     return _weighted(frf.line_correlation, np.sqrt(noise), straight, weight), _weighted(np.zeros(1), noise, folded, weight)

@@ -19,14 +19,14 @@ from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 
 LARGEST_DAMPING = 1e12
-ROUNDING = 1e-26  # a cost below this part of the data's own is zero in double precision
-NEAR_ROUNDING = 1e-20  # below this part, a step that fails is blamed on rounding
-RANK = 1e-13  # a direction whose factor is below this part of the largest is left where it is
+ROUNDING = 1e-26  # a cost below this fraction of the data's own is zero in double precision
+NEAR_ROUNDING = 1e-20  # below this fraction, a failing step is attributed to rounding
+RANK = 1e-13  # a direction whose factor is below this fraction of the largest is not changed
 
 
 @dataclass(frozen=True, slots=True)
 class Minimum:
-    """Where a minimisation ended, and why; table: what ``weighted`` gives there."""
+    """Result of a minimisation, and the reason for its end; table: output of ``weighted`` at that point."""
 
     point: Point
     cost: float
@@ -112,7 +112,7 @@ def triangle(rows: FloatArray) -> FloatArray:
 
 
 def _factor(task: Problem, rows: FloatArray, at: Point) -> tuple[FloatArray, FloatArray]:
-    """(R of the scaled table, scales); a delay at its limit that wants to go further is held."""
+    """(R of the scaled table, scales); a delay at its limit that would exceed it is held."""
     upper = triangle(rows)
     scale = np.sqrt(np.sum(upper[:, :-1] ** 2, axis=0))
     scale[~(scale > 0)] = 1.0
@@ -126,7 +126,7 @@ def _factor(task: Problem, rows: FloatArray, at: Point) -> tuple[FloatArray, Flo
 
 @compiled
 def _step(upper: NDArray[np.float64], damping: float) -> tuple[NDArray[np.float64], float]:
-    """(step, by how much it lowers the linearised cost): min |R x - q|^2 + damping |x|^2 with (R, q) the table's factor."""
+    """(step, reduction of the linearised cost): min |R x - q|^2 + damping |x|^2 with (R, q) the table's factor."""
     size = upper.shape[0] - 1
     r, q = upper[:size, :size].copy(), upper[:size, size].copy()
     if damping > 0.0:

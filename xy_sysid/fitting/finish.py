@@ -1,4 +1,4 @@
-"""From a point in the space of models to a Fit: coefficients, poles, zeros, and how sure each of them is."""
+"""From a point in parameter space to a Fit: coefficients, poles, zeros, and their uncertainty."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CONSISTENT = 3.0  # standard deviations
 
 
 def finish(task: Problem, at: Point, method: str, end: Ended, start: str, table: FloatArray | None = None) -> Fit:
-    """Work out everything that a Fit says; table: ``damped.weighted`` at the point, if it is there already."""
+    """Compute the content of a Fit; table: ``damped.weighted`` at the point, if it is already available."""
     structure, plan, frf = task.structure, task.plan, task.frf
     table = weighted(task, at) if table is None else table
     error = table[-1].reshape(2, -1) / task.weight
@@ -96,7 +96,7 @@ def finish(task: Problem, at: Point, method: str, end: Ended, start: str, table:
 
 
 def _failed(task: Problem, at: Point, method: str, end: Ended, start: str) -> Fit:
-    """Nothing could be estimated: numbers ran out of range. Everything that is not known is NaN."""
+    """A Fit without an estimate: numbers were out of range. Everything unknown is NaN."""
     structure, frf, nan = task.structure, task.frf, float("nan")
     lines, names = np.full(len(frf), np.nan), _names(task)
     bottom = np.zeros(structure.free_order + max(structure.power, 0) + 1)
@@ -141,7 +141,7 @@ def _ordered(roots: ComplexArray) -> ComplexArray:
 
 
 def _to_coefficients(task: Problem, at: Point) -> tuple[FloatArray, FloatArray]:
-    """(m + 1, m + 1) and (n + 1, n + 1): row k is what parameter k adds to the coefficients of rising powers of s."""
+    """(m + 1, m + 1) and (n + 1, n + 1): row k is the contribution of parameter k to the coefficients of rising powers of s."""
     up, down = at.numerator.powers(), at.denominator.powers()
     lead = down[-1, -1] * at.a[-1]
     scale, free = task.plan.scale, float(task.structure.free_order)

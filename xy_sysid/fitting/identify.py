@@ -1,4 +1,4 @@
-"""The estimate to trust by default: maximum likelihood from a warm start, checked against a cold one when in doubt."""
+"""The default estimate: maximum likelihood from a warm start; if in doubt, compared with a cold start."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
-WARM_DAMPING = 1e-6  # part of the usual damping that a warm start begins with: it is near, so that Gauss-Newton steps are right
+WARM_DAMPING = 1e-6  # fraction of the usual damping for a warm start: it is close, so that Gauss-Newton steps are accurate
 
 
 def warm(options: FitOptions) -> FitOptions:
-    """The same for a start that is close to the minimum."""
+    """The options for a start that is close to the minimum."""
     return replace(options, damping=options.damping * WARM_DAMPING)
 
 

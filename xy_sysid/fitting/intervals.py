@@ -16,7 +16,7 @@ from xy_sysid.response.frf import Z95, ComplexArray
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import over, position_of
 
-BEYOND = 1e3  # standard error over the value from which an interval is shown as unlimited
+BEYOND = 1e3  # standard error relative to the value from which an interval is shown as unlimited
 PAIRS = {"pole": "resonance", "zero": "antiresonance"}
 
 
@@ -28,7 +28,7 @@ def _estimate(name: str, value: float, variance: float, unit: str) -> Interval:
 
 
 def with_rate(items: Iterable[Interval], error: float, structure: Structure) -> tuple[Interval, ...]:
-    """The intervals with what the sampling rate may be off by (``error``, relative): every time and frequency goes with it.
+    """The intervals including the relative ``error`` of the sampling rate, with which every time and frequency scales.
 
     A model of s that is fitted to lines of a rate c times too high has b_k and a_k c^(n - k) times too large, n the order.
     """
@@ -41,7 +41,7 @@ def with_rate(items: Iterable[Interval], error: float, structure: Structure) -> 
 
 
 def _power(name: str, structure: Structure) -> int:
-    """Of the sampling rate that an estimate goes with."""
+    """The power of the sampling rate with which an estimate scales."""
     kind, _, rest = name.partition("_")
     if kind == "delay" or (kind in PAIRS.values() and rest.endswith("frequency")):
         return 1
@@ -53,7 +53,7 @@ def _power(name: str, structure: Structure) -> int:
 
 
 def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance: FloatArray) -> tuple[Interval, ...]:
-    """The reported parameters, in their order."""
+    """The reported parameters, in order."""
     return tuple(
         _estimate(name, float(value), float(variance), "s" if name == "delay" else "")
         for name, value, variance in zip(names, values, np.diag(covariance), strict=True)
@@ -61,7 +61,7 @@ def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance
 
 
 def gain_estimate(task: Problem, at: Point, inner: FloatArray) -> Interval:
-    """Of s^integrators times the position's response at s = 0: the static gain, with one integrator the velocity gain."""
+    """Gain of s^integrators times the position's response at s = 0: the static gain, or the velocity gain with one integrator."""
     structure, frf = task.structure, task.frf
     where = np.array([0.0 + 0.0j if structure.domain == "s" else 1.0 + 0.0j])
     up, down = at.numerator.values(where)[0].real, at.denominator.values(where)[0].real
@@ -82,7 +82,7 @@ def root_estimates(task: Problem, at: Point, roots: ComplexArray, inner: FloatAr
     roots: of the denominator ("pole") or the numerator ("zero") at the point; inner: covariance of its parameters
     Gives <name>_i, or <name>_i.real and .imag, and frequency and damping of each oscillating pair.
     """
-    part, coefficients, first = (at.denominator, at.a, at.b.size) if name == "pole" else (at.numerator, at.b, 0)  # c_0 stands at first
+    part, coefficients, first = (at.denominator, at.a, at.b.size) if name == "pole" else (at.numerator, at.b, 0)  # c_0 comes first
     discrete = task.structure.domain == "z"
     scale, unit = (1.0, "") if discrete else (task.plan.scale, "rad/s")
     size = coefficients.size - int(name == "pole")

@@ -14,7 +14,7 @@ DEFAULTS = FitOptions()
 
 
 def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
-    """Fit by re-weighted linear steps at the best delay; ``start`` is not needed and not used. Raises BadInput for too few lines."""
+    """Fit by reweighted linear steps at the best delay; ``start`` is ignored. Raises BadInput for too few lines."""
     del start
     task = problem(frf, structure)
     point, _, steps = searched(task, options.reweightings, options)

@@ -17,9 +17,9 @@ from xy_sysid.fitting.structure import FitOptions
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
-SCAN_STEPS = 4  # re-weightings at each delay of the scan: enough to rank delays
-MOST_DELAYS = 400  # of one scan; of more, lower lines tell first which
-FOLLOWED = 6  # best delays of the lower lines around which the fine grid is looked through
+SCAN_STEPS = 4  # reweightings at each delay of the scan: enough to rank delays
+MOST_DELAYS = 400  # of one scan; with more, lower lines select a range first
+FOLLOWED = 6  # best delays of the lower lines around which the fine grid is searched
 
 
 def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) -> Point:
@@ -42,7 +42,7 @@ def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) 
     upper: FloatArray = np.asarray(np.linalg.qr(np.concatenate((table.real, table.imag)), mode="r"))
     size = upper.shape[1] - 1
     if not np.all(np.isfinite(upper)):
-        upper = np.zeros_like(upper)  # nothing can be solved: a point of cost infinity or worse than any other
+        upper = np.zeros_like(upper)  # not solvable: a point whose cost is infinite or worse than any other
     solution: FloatArray = np.asarray(np.linalg.lstsq(upper[:size, :size], upper[:size, size], rcond=1e-14)[0], dtype=np.float64)
     split = structure.numerator_order + 1
     return Point(numerator=numerator, denominator=denominator, b=solution[:split], a=np.append(solution[split:], 1.0), delay=delay)
@@ -113,7 +113,7 @@ def _simple_cost(task: Problem, at: Point) -> float:
 
 
 def searched(task: Problem, steps: int, options: FitOptions) -> tuple[Point, float, int]:
-    """The linear estimator's answer: best delay of the scan, then a golden-section search around it."""
+    """The estimate of the linear method: best delay of the scan, then a golden-section search around it."""
     candidates = scan(task, steps, options)
     _, delay, start = candidates[0]
     best, lowest, count = reweighted(task, delay, steps, start if steps > 1 else None)

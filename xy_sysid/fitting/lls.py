@@ -17,7 +17,7 @@ FINER = 10  # the scan over delays: one linear step is only right close to the d
 
 
 def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
-    """Fit by one linear step at the best delay; ``start`` is not needed and not used. Raises BadInput for too few lines.
+    """Fit by one linear step at the best delay; ``start`` is ignored. Raises BadInput for too few lines.
 
     Its bias can hide a free delay from order 4 on; IWLS finds it.
     """

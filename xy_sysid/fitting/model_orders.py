@@ -15,13 +15,13 @@ from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import Structure
 from xy_sysid.response.frf import FrequencyResponse
 
-WIDER = 2  # orders tried above and below the one that was asked for
-CLEARLY = 10.0  # MDL by which another order must win before it is suggested: odds of e^10
+WIDER = 2  # orders tested above and below the requested one
+CLEARLY = 10.0  # MDL difference from which another order is suggested: odds of e^10
 
 
 @dataclass(frozen=True, slots=True)
 class OrderTrial:
-    """One structure tried: its orders, cost, and description length."""
+    """One tested structure: its orders, cost, and description length."""
 
     numerator_order: int
     denominator_order: int
@@ -35,12 +35,12 @@ class OrderTrial:
 
 
 def independent_data(frf: FrequencyResponse, lines: int) -> float:
-    """Real numbers' worth of independent data in so many lines, whose errors are correlated."""
+    """Equivalent number of independent real data in this many lines, whose errors are correlated."""
     return 2.0 * lines / float(1.0 + 2.0 * frf.line_correlation[1:].sum())
 
 
 def try_orders(frf: FrequencyResponse, fit: Fit) -> tuple[OrderTrial, ...]:
-    """Structures near the one of ``fit``, best first; those that do not converge are left out.
+    """Structures near that of ``fit``, best first, without those that do not converge.
 
     The relative degree is kept (a pole and a zero more or less at a time) and varied by one.
     """
@@ -70,5 +70,5 @@ def _fitted(frf: FrequencyResponse, structure: Structure) -> Fit | None:
 
 
 def description_length(fit: Fit, data: float, scale: float = 1.0) -> float:
-    """nats; data: independent real numbers; scale: cost over that of noise alone which no model gets below."""
+    """Description length, nats; data: independent real numbers; scale: least cost of any model relative to that of noise alone."""
     return fit.cost / scale + 0.5 * fit.structure.parameters * math.log(max(data, 2.0))

@@ -1,4 +1,4 @@
-"""Where the poles are, and nothing else: the short way for a response that is fitted only to watch a resonance."""
+"""Poles only: a fast fit of a response, used to watch a resonance."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DEFAULTS = FitOptions()
 
 
 def pole_estimates(frf: FrequencyResponse, structure: Structure, start: TransferFunction, options: FitOptions = DEFAULTS) -> tuple[Interval, ...]:
-    """Poles and resonances with intervals, as ``identify`` gives them from this start; empty if it leads nowhere.
+    """Poles and resonances with intervals, as from ``identify`` with this start; empty if the fit fails.
 
     Raises BadInput for too few trusted lines.
     """

@@ -16,19 +16,19 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
-MOST_STARTS = 4  # delays of the scan that are followed to their minimum when nothing is as good as noise allows
+MOST_STARTS = 4  # delays of the scan whose minima are computed if no fit is consistent with the noise
 
 
 def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
-    """The minimum that ``start`` leads to, or the best of those that the linear estimators lead to.
+    """The minimum from ``start``, or the best of those from the linear estimators.
 
-    Raises BadInput for too few lines, or a start that is not of the structure.
+    Raises BadInput for too few lines, or a start with another structure.
     """
     return solve(problem(frf, structure), start, options, options.method)
 
 
 def solve(task: Problem, start: TransferFunction | None, options: FitOptions, name: str) -> Fit:
-    """The same for lines already weighted; name: what the method is called in the result."""
+    """The minimum for lines that are already weighted; name: of the method in the result."""
     if start is not None:
         point = from_transfer_function(task, start)
         if point is not None:
@@ -49,7 +49,7 @@ def cold(task: Problem, options: FitOptions) -> Minimum:
         if best is None or (found.cost < best.cost and (found.converged or not best.converged)):
             best = found
         if best.cost <= 1.5 * float(len(task.frf)) and task.structure.weighting == "sigma":
-            break  # as good as the noise allows
+            break  # consistent with the noise
     assert best is not None
     mirrored = _mirrored(task, best.point)
     found = minimise(task, mirrored, options) if mirrored is not None else best
@@ -57,10 +57,10 @@ def cold(task: Problem, options: FitOptions) -> Minimum:
 
 
 def _mirrored(task: Problem, at: Point) -> Point | None:
-    """The same with unstable poles made stable; None if there are none.
+    """The point with unstable poles mirrored to stable ones; None if there are none.
 
-    A fast pole is hardly more than a lag of 1 / |pole|, one in the right half plane a lead: what the delay can make up for.
-    So a fit may end with the pole on the wrong side and the delay too long, by 2 / pole.
+    A fast pole has the effect of a lag of 1 / |pole|, or of a lead in the right half plane, which the delay can compensate.
+    Therefore a fit may end with an unstable pole and a delay that is too long by 2 / pole.
     """
     poles = at.denominator.roots(at.a)
     wrong = poles[poles.real > 0]
@@ -69,7 +69,7 @@ def _mirrored(task: Problem, at: Point) -> Point | None:
     line = task.plan.line[:, None]
     up, down = rational(task, at)
     down = down * np.prod((line + wrong.conj()) / (line - wrong), axis=1)
-    up = up * float(np.prod(wrong.conj() / -wrong).real)  # the gain stays what it is
+    up = up * float(np.prod(wrong.conj() / -wrong).real)  # keep the gain
     delay = max(at.delay - float(np.sum(2.0 / wrong).real) / task.plan.scale, 0.0)
     return in_bases(task, up, down, delay, task.weight * np.abs(task.plan.line_factor / down))
 
@@ -80,7 +80,7 @@ def _followed(task: Problem, delay: float, start: Point, options: FitOptions) ->
 
 
 def _grown(task: Problem, options: FitOptions) -> Minimum:
-    """The minimum from the delay of a rigid axis."""
+    """The minimum from a start with the delay of a rigid axis."""
     relative = replace(task.structure, weighting="relative")
     rigid = problem(task.frf, replace(relative, numerator_order=0, denominator_order=min(relative.integrators + 1, relative.denominator_order)))
     _, first, start = scan(rigid, options.reweightings, options)[0]

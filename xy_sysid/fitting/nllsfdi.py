@@ -1,4 +1,4 @@
-"""The paper's own path, as the MATLAB routine nllsfdi (nlsfdi) takes it: for comparison, not for use.
+"""The paper's own method, as in the MATLAB routine nllsfdi (nlsfdi): for comparison only.
 
 Frequency axis scaled by the median of |j w|; LLS by pseudo-inverse; one LLS re-weighted by 1 / |A|; then Gauss-Newton or
 Levenberg-Marquardt on powers of s: each column's own square damped by lambda = 0.01, halved on success, times 10 on failure. It
@@ -67,7 +67,7 @@ def _powers(s: ComplexArray, highest: int) -> ComplexArray:
 
 
 def _pinv(table: FloatArray) -> FloatArray:
-    """With MATLAB's tolerance."""
+    """The pseudo-inverse with MATLAB's tolerance."""
     return np.asarray(np.linalg.pinv(table, rcond=max(table.shape) * np.finfo(float).eps))
 
 

@@ -1,4 +1,4 @@
-"""How a response that was measured elsewhere is fitted: nothing was held between samples, and its low end tells whether it integrates."""
+"""Fit of a response measured elsewhere: no hold between samples; the low end of the response shows whether it integrates."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.units import derivative_of
 
-LOW = 10  # lines at the low end whose slope tells
+LOW = 10  # lines at the low end for the slope
 USUAL = IdentifierSettings()
 
 
 def is_given(response: FrequencyResponse) -> bool:
-    """Whether it comes from no windows of samples."""
+    """True if it was not estimated from windows of samples."""
     return response.resolution == 0.0
 
 
 def settings_for(response: FrequencyResponse, settings: IdentifierSettings) -> IdentifierSettings:
-    """The settings with the hold and the integrators of a response that was measured elsewhere, where they are the usual ones."""
+    """The settings with hold and integrators for a response measured elsewhere, where they have default values."""
     if not is_given(response):
         return settings
     hold = "none" if settings.hold == USUAL.hold else settings.hold
@@ -29,14 +29,14 @@ def settings_for(response: FrequencyResponse, settings: IdentifierSettings) -> I
 
 
 def band_of(response: FrequencyResponse, settings: IdentifierSettings) -> FrequencyResponse:
-    """All lines of a response that was measured elsewhere, or those of a band that the user chose."""
+    """All lines of a response measured elsewhere, or those of a band that the user chose."""
     low = settings.band_low if settings.band_low != USUAL.band_low else 0.0
     high = settings.band_high if settings.band_high != USUAL.band_high else np.inf
     return response.band(low, high)
 
 
 def _integrators(response: FrequencyResponse) -> int:
-    """0, 1 or 2: as many as both the slope of the magnitude and the phase of the lowest lines show."""
+    """0, 1 or 2 integrators: the number on which magnitude slope and phase of the lowest lines agree."""
     lines = slice(0, LOW)
     slope = float(np.polyfit(np.log(response.frequency[lines]), np.log(np.abs(response.response[lines])), 1)[0])
     phase = float(np.angle(np.sum(response.response[lines] / np.abs(response.response[lines]))))

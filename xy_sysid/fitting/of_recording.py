@@ -1,4 +1,4 @@
-"""Frequency response of a whole recording, axis by axis."""
+"""Frequency response of a full recording, axis by axis."""
 
 from __future__ import annotations
 
@@ -32,25 +32,25 @@ HALVES = (
     "The input repeats with the other sign every {half} samples ({seconds:.6g} s), half its period: "
     "windows of one period, made of each half and its negative."
 )
-FIXED = ("nllsfdi",)  # estimators of the paper's own structure: orders that are not asked for are 2/4
-WINDOWS, SHORTEST = 3, 16  # windows, side by side, that a record holds at least, and samples of the shortest
-LONGEST = 16_384  # samples of a window of which one will do
-MOST_ON_GRID = 0.5  # of the windows that fit; where the grid holds fewer, each stretch has windows from its own beginning on
-COVERED = 0.5  # of the samples that such windows take in at least
-MANY = 6  # periods that must be there where feedback or friction shape the input
-MOST_TRANSIENT = 2  # periods of a stretch of which none can be left out
+FIXED = ("nllsfdi",)  # estimators with the paper's own structure: the default orders are 2/4
+WINDOWS, SHORTEST = 3, 16  # least number of adjacent windows in a record, and samples of the shortest window
+LONGEST = 16_384  # samples of a window, if a single one suffices
+MOST_ON_GRID = 0.5  # of the possible windows; if the grid holds fewer, each stretch has windows from its own start
+COVERED = 0.5  # of the samples: least fraction in such windows
+MANY = 6  # periods needed if feedback or friction shape the input
+MOST_TRANSIENT = 2  # number of periods of a stretch from which none can be left out
 BEST = "Several realisations of a periodic input: noise and nonlinear distortion are separated, and sigma is the larger of the two."
 TRANSIENT = 1  # periods left out at the start of a periodic recording
 USUAL = IdentifierSettings()
-ROUNDING = 1e-12  # of the response: no line of a made-up signal without noise is more exact than its numbers
-SMALLEST, LARGEST = 1e-100, 1e100  # of what is measured: squares of more or less leave the range of numbers
+ROUNDING = 1e-12  # of the response: a simulated signal without noise is not more accurate than its numbers
+SMALLEST, LARGEST = 1e-100, 1e100  # of the measurement: squares of other values are out of range
 
 
 @dataclass(frozen=True, slots=True)
 class AxisEstimate:
-    """The response of one axis and how it came about.
+    """The response of one axis and details of its estimation.
 
-    period: samples of one period of the input, None if it does not repeat; notes: sentences a user should read
+    period: samples of one period of the input, None if it is not periodic; notes: sentences for the user
     """
 
     axis: str
@@ -75,7 +75,7 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     runs = recording.runs()
     integrated = recording.measured != "position"
     if integrated:
-        settings = replace_settings(settings, differenced=False)  # what was measured itself has no drift whose ends would leak
+        settings = replace_settings(settings, differenced=False)  # a directly measured quantity has no drift and therefore no leakage from it
     longest = recording.run(axis).rows
     notes: list[str] = []
     half = None
@@ -137,7 +137,7 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
 
 
 def _realisations(pieces: list[tuple[FloatArray, FloatArray]], period: int, differenced: bool) -> list[Realisation]:
-    """Input and output of each stretch, period by period, the first left out where three remain with it."""
+    """Input and output of each stretch, period by period, without the first one if at least two others remain."""
     found = []
     for u, y in pieces:
         output = np.diff(y) if differenced else y
@@ -150,7 +150,7 @@ def _realisations(pieces: list[tuple[FloatArray, FloatArray]], period: int, diff
 
 
 def _sensed(recording: Recording, y: FloatArray, period: int, sign: float = 1.0) -> FloatArray:
-    """(n,) as the sensor reads it. The last of each run, which its integral does not hold, are as a period before, or as the one before them."""
+    """(n,) the output as the sensor reads it. Missing last samples of each run are copied from a period before, or from the sample before."""
     found = np.zeros_like(y)
     for run in recording.runs():
         own = as_sensed(y[run], recording.sampling_rate, recording.measured)
@@ -162,13 +162,13 @@ def _sensed(recording: Recording, y: FloatArray, period: int, sign: float = 1.0)
 
 
 def _distorted(recording: Recording, axis: str, rows: slice) -> bool:
-    """Whether feedback or friction shape the input: what they add repeats with it, so that few periods take it for the response."""
+    """True if feedback or friction shape the input: their contribution is periodic too, and few periods cannot separate it from the response."""
     u, y = recording.axis(axis)
     return bool(_closed_loop(recording, axis) or friction_note(friction_hint(u[rows], y[rows], recording.sampling_rate)))
 
 
 def _reference(recording: Recording, axis: str) -> FloatArray:
-    """(n,) of one axis; raises BadInput if there is none, or one that does not move."""
+    """(n,) reference of one axis; raises BadInput if there is none, or a constant one."""
     if recording.reference is None:
         act = "Record it (topic reference, column x_reference), or leave response at h1."
         raise BadInput("response", "joint_input_output, and the recording has no reference", "a recording with a reference", act)
@@ -182,7 +182,7 @@ def _samples(run: slice) -> int:
 
 
 def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], names: tuple[str, str] = ("input", "output")) -> None:
-    """Raises BadInput for an input or output that does not move, or that moves by more than numbers can be squared."""
+    """Raises BadInput for an input or output that is constant, or whose square would overflow."""
     acts = "Excite this axis.", "Check the encoder, and that the axis is enabled."
     for name, values, unit, act in zip(names, (u, y), units, acts, strict=True):
         if values.size == 0 or float(np.ptp(values)) == 0.0:
@@ -194,9 +194,9 @@ def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], nam
 
 
 def _fitting(settings: IdentifierSettings, runs: list[slice], notes: list[str], tapered: bool) -> IdentifierSettings:
-    """The settings with a window that the record holds often enough; unchanged if the user chose another length than the default.
+    """The settings with a window that fits often enough into the record; unchanged if the user chose a length.
 
-    tapered: several windows are averaged; otherwise lines are, so that one window will do, and the longer it is, the finer they lie
+    tapered: several windows are averaged; otherwise lines are, so that one window suffices, and a longer one gives finer lines
     """
     if settings.length != USUAL.length:
         return settings
@@ -214,7 +214,7 @@ def _fitting(settings: IdentifierSettings, runs: list[slice], notes: list[str], 
 
 
 def _possible(settings: IdentifierSettings, rate: float, samples: int) -> None:
-    """Raises BadInput, before any work is done, for windows longer than the data and for a band that they cannot show."""
+    """Raises BadInput, before any computation, for windows longer than the data and for a band outside their range."""
     needed = settings.length + int(settings.differenced)
     if samples < needed:
         shorter = f", or shorten the window with --set length={max(samples // 4, SHORTEST)}" if settings.length > SHORTEST else ""
@@ -229,7 +229,7 @@ def _possible(settings: IdentifierSettings, rate: float, samples: int) -> None:
 
 
 def _fits(recording: Recording, runs: list[slice], shape: WindowShape, differenced: bool) -> bool:
-    """Whether the grid of windows (see ``windows``) holds most of those that fit into the runs; short ones may lie between two."""
+    """True if the grid of windows (see ``windows``) holds most of those that fit into the runs; short ones may lie between two."""
     needed = shape.length + int(differenced)
     rooms = [(_samples(run) - needed, -int(recording.seq[run.start]) % shape.hop) for run in runs if _samples(run) >= needed]
     on_grid = sum((room - first) // shape.hop + 1 for room, first in rooms if room >= first)
@@ -237,14 +237,14 @@ def _fits(recording: Recording, runs: list[slice], shape: WindowShape, differenc
 
 
 def _coherence(frf: FrequencyResponse, settings: IdentifierSettings, periodic: bool) -> list[str]:
-    """Too little to judge, or hardly more trusted lines than noise alone would give."""
+    """Notes if there are too few data, or hardly more trusted lines than from noise alone."""
     if frf.averages < 2.0:
         return [f"Only {frf.averages:.1f} independent windows: no uncertainty, so no line is trusted. Record longer, or shorten the window."]
     if periodic:
         return []
-    none = 1.0 - settings.min_coherence  # chance that a line of no coherence stays below
+    none = 1.0 - settings.min_coherence  # probability that a line without coherence stays below
     chance = none ** (frf.averages - 1.0) * len(frf)
-    usual = 1.0 - none * 0.1 ** (1.0 / (frf.averages - 1.0))  # nine of ten such lines by chance have no more coherence
+    usual = 1.0 - none * 0.1 ** (1.0 / (frf.averages - 1.0))  # nine of ten lines without coherence are below this by chance
     trusted = int(frf.trusted.sum())
     many = trusted > chance + HARDLY * math.sqrt(2.0 * chance)
     if many or (trusted and float(np.median(frf.coherence[frf.trusted])) > usual):
@@ -258,7 +258,7 @@ def _coherence(frf: FrequencyResponse, settings: IdentifierSettings, periodic: b
 def _periodic(
     settings: IdentifierSettings, runs: list[slice], period: int, notes: list[str], rate: float, what: str
 ) -> tuple[IdentifierSettings, list[slice]]:
-    """what: repeats, the input or the reference."""
+    """Settings for a periodic signal. what: the periodic signal, the input or the reference."""
     first = runs[0]
     if (first.stop - first.start) // period > TRANSIENT + 1:
         runs = [slice(first.start + TRANSIENT * period, first.stop), *runs[1:]]
@@ -269,7 +269,7 @@ def _periodic(
 
 
 def replace_settings(settings: IdentifierSettings, **values: object) -> IdentifierSettings:
-    """The settings with some values changed, unchecked by limits that only concern users."""
+    """The settings with some values changed, without the checks for users."""
     return settings.model_copy(update=values)
 
 
@@ -293,14 +293,14 @@ def _closed_loop(recording: Recording, axis: str) -> list[str]:
 
 
 def judged(frf: FrequencyResponse) -> None:
-    """Raises BadInput for a response without an uncertainty of its own, to which nothing can be fitted or compared."""
+    """Raises BadInput for a response without an uncertainty, which cannot be fitted or compared."""
     if frf.averages < 2.0:
         act = "Record longer, or shorten the window with --set length=."
         raise BadInput("number of independent windows", f"{frf.averages:.1f}", "2 or more, so that there is an uncertainty", act)
 
 
 def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[IdentifierSettings, Choice | None]:
-    """The settings with orders chosen from the response, and the reason; unchanged, and None, if the user gave orders."""
+    """The settings with orders chosen from the response, and the choice; unchanged, and None, if the user gave orders."""
     if not settings.orders_from_data:
         return settings, None
     family = structure_from(settings)
@@ -321,13 +321,13 @@ def with_orders(frf: FrequencyResponse, settings: IdentifierSettings) -> tuple[I
 
 
 def fitted(frf: FrequencyResponse, settings: IdentifierSettings) -> Fit:
-    """A transfer function of the orders asked for, or of those that the response tells."""
+    """A transfer function with the given orders, or with those that the response supports."""
     settings, choice = with_orders(frf, settings)
     return choice.fit if choice is not None else identify(frf, structure_from(settings))
 
 
 def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:
-    """The first part to fit, and the last ``held_out`` (0..0.9) of the samples that no fit sees."""
+    """The first part, for the fit, and the last ``held_out`` (0..0.9) of the samples, which are held out."""
     if not 0.0 <= held_out <= 0.9:
         raise BadInput("held-out part", held_out, "0 to 0.9", "Choose for example 0.2.")
     cut = len(recording) - round(held_out * len(recording))
@@ -335,7 +335,7 @@ def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:
 
 
 def few_periods(recording: Recording, held_out: float) -> bool:
-    """Whether the input repeats itself so few times that without the part held out it would not be there twice."""
+    """True if the input has so few periods that fewer than two remain without the held-out part."""
     if not 0.0 <= held_out <= 0.9:
         return False  # refused by ``split``
     rows = len(recording) - round(held_out * len(recording))
@@ -345,5 +345,5 @@ def few_periods(recording: Recording, held_out: float) -> bool:
 
 
 def part(recording: Recording, rows: slice) -> Recording:
-    """Some consecutive rows of a recording."""
+    """Consecutive rows of a recording."""
     return recording.only(rows)

@@ -49,7 +49,7 @@ class LinearModel:
 
     @property
     def label(self) -> str:
-        """A few words for a legend."""
+        """A short text for a legend."""
         return f"transfer function {self.tf.numerator.size - 1}/{self.tf.denominator.size - 1}"
 
     @property
@@ -59,12 +59,12 @@ class LinearModel:
 
     @property
     def intervals_with_misfit(self) -> tuple[Interval, ...]:
-        """The same, widened for the residual error above the noise."""
+        """The intervals, widened for the residual error above the noise."""
         return self.fit.intervals_with_misfit if self.fit is not None else ()
 
     @property
     def ok(self) -> bool:
-        """Every verdict is good."""
+        """True if every verdict is good."""
         return all(verdict.ok for verdict in self.verdicts)
 
     @property
@@ -157,7 +157,7 @@ def fit_response(
     settings = settings_for(response, settings)
     method, choice = method or Method(), None
     try:
-        with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
+        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts reject
             if method.domain == "s" and method.estimator not in FIXED:
                 settings, choice = with_orders(response, settings)
             if choice is not None and (method.estimator, method.weighting) == ("best", "sigma"):

@@ -1,6 +1,6 @@
-"""From a transfer function to what the spectra are expected to show: hold, delay, sampling, window.
+"""From a transfer function to the expected spectra: hold, delay, sampling, window.
 
-Everything that depends only on the lines, the window and the structure is worked out once, here, and kept.
+Everything that depends only on the lines, the window and the structure is computed once and cached.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from xy_sysid.linear.hold import ALIASES, TAIL_POINTS, interpolation, nodes_for
 from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.samples.block import FloatArray
 
-NO_WEIGHT = 1e-15  # weights of the window below this share of the largest are rounding
+NO_WEIGHT = 1e-15  # weights of the window below this fraction of the largest are rounding errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Plan:
 
 
 def plan_for(frf: FrequencyResponse, structure: Structure) -> Plan:
-    """The plan for the lines of a response; kept from the last few calls with the same lines."""
+    """The plan for the lines of a response; cached for the last few calls."""
     return _plan(
         _Lines(
             frequency=frf.frequency.tobytes(),
@@ -83,7 +83,7 @@ def plan_for(frf: FrequencyResponse, structure: Structure) -> Plan:
 
 @dataclass(frozen=True, slots=True)
 class _Lines:
-    """All that a plan depends on, in a form that can be looked up; rate, resolution: Hz."""
+    """Everything that a plan depends on, as a cache key; rate, resolution: Hz."""
 
     frequency: bytes
     kernel_offset: bytes

@@ -18,7 +18,7 @@ from xy_sysid.linear.hold import ALIASES, SERIES, TAIL_POINTS, tail_sums
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
-TAIL_REACH = 0.5  # the series in 1 / s is used while every pole is within this part of the last alias
+TAIL_REACH = 0.5  # the series in 1 / s is used if every pole is within this fraction of the last alias
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,10 @@ row:       one axis of a recording -> its row
 naming:    which machine, axis and date a recording belongs to
 of_file:   one file -> its rows
 finding:   folders and patterns -> files
-digest:    a file or folder -> the hash of what is in it
+digest:    a file or folder -> the hash of its content
 table:     the Parquet data set
-journal:   rows that are not in the table yet, so that a killed run loses none
-estimate:  how long the rest will take
+journal:   rows that are not in the table yet; a killed run loses none
+estimate:  the remaining time of a run
 engine:    files -> rows, on the processes of a dask cluster
-of_paths:  all of these in one call
+of_paths:  all of this in one call
 """

@@ -1,11 +1,11 @@
 """The wander of a parameter on similar machines, learned from the series of all other axes of a table.
 
-Machines of a fleet wander alike, but not in the same way. So the model has two levels: each candidate says that the spreads of the axes are
-log-normal about one value with one width, and that mostly one kind of slowness acts. The candidates are weighed by how well they explain the series
-of all axes. A new axis wanders as the weighed candidates predict. So it is learned, too, how alike the machines are: twenty axes that spread by 2 %
-are told from twenty axes that spread by 0.5 to 8 %.
+Machines of a fleet wander similarly, but not identically. Therefore the model has two levels. Each candidate says that the spreads of the axes are
+log-normal about one value with one width, and that one kind of slowness is usual. The candidates are weighted by how well they explain the series
+of all axes. The wander of a new axis is predicted from the weighted candidates. This also learns how similar the machines are: it distinguishes
+twenty axes that all spread by 2 % from twenty axes that spread by 0.5 to 8 %.
 
-The weights for an axis come from the other axes alone. Its own series is counted once, in its statistic.
+The weights for an axis come only from the other axes. Its own series is counted once, in its statistic.
 
 Sources: Gelman et al., Bayesian Data Analysis, 3rd ed., ch. 5 (hierarchical models); Robbins, An empirical Bayes approach to statistics (1956).
 """
@@ -24,7 +24,7 @@ from xy_sysid.samples.block import FloatArray
 
 WIDTHS = (0.1, 0.3, 0.6, 1.2)  # standard deviation of the logarithm of the axes' spreads
 OTHER = 0.1  # probability that an axis has another kind of slowness than most
-FEWEST = 3  # recordings of a series that tells anything
+FEWEST = 3  # recordings; a shorter series carries no information
 
 
 @functools.cache
@@ -44,15 +44,15 @@ def candidates() -> FloatArray:
 
 @functools.cache
 def before() -> FloatArray:
-    """(c,) log probability of each candidate before any series is seen: so that a first axis wanders as usual."""
+    """(c,) log probability of each candidate before any series is seen: the usual wander for a first axis."""
     found = np.log(np.exp(candidates()) @ np.exp(usual()))
     return np.asarray(found - logsumexp(found))
 
 
 def likelihood(found: Evidence) -> FloatArray:
-    """(g,) log likelihood of a series for each wander, whether the parameter changed once or not: both are as probable, and all beginnings alike.
+    """(g,) log likelihood of a series for each wander. A change and no change are equally probable, and so are all starts of the change.
 
-    0 for a series that is too short to tell anything.
+    0 for a series that is too short.
     """
     count = found.none.shape[1]
     if count < FEWEST:
@@ -61,12 +61,12 @@ def likelihood(found: Evidence) -> FloatArray:
 
 
 def learned(every: Sequence[Evidence]) -> FloatArray:
-    """(g,) log weights of the grid for another axis like these."""
+    """(g,) log weights of the grid for a new, similar axis."""
     return _predicted(_explained(every).sum(axis=0)) if len(every) else usual()
 
 
 def learned_for_each(every: Sequence[Evidence]) -> list[FloatArray]:
-    """(g,) log weights of the grid for each of these axes, from all others."""
+    """(g,) log weights of the grid for each of these axes, learned from all others."""
     each = _explained(every)
     return [_predicted(row) for row in each.sum(axis=0) - each] if len(every) > 1 else [usual() for _ in every]
 
@@ -77,6 +77,6 @@ def _explained(every: Sequence[Evidence]) -> FloatArray:
 
 
 def _predicted(explained: FloatArray) -> FloatArray:
-    """(g,) log weights, of how well each candidate explains the series (c,)."""
+    """(g,) log weights of the grid, from the log likelihood (c,) of the series for each candidate."""
     log = before() + explained
     return np.asarray(logsumexp((log - logsumexp(log))[:, None] + candidates(), axis=0))

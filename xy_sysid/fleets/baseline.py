@@ -1,12 +1,12 @@
-"""Which parameter of an axis has left its interval since commissioning? The estimates of a running machine are compared with those of a model file.
+"""Has a parameter of an axis left its interval since commissioning? Compares the estimates of a running machine with those of a model file.
 
-The baseline is one recording, and what is heard since the node began is another: temperature, load and lubrication differ between the two and not
-within them. So the estimates of the running machine are not a series of independent recordings. Each of them is compared with the baseline by the
+The baseline is one recording, and the data since the node started are another: temperature, load and lubrication differ between the two and not
+within them. Therefore the estimates of the running machine are not independent recordings. Each is compared with the baseline by the
 test of ``change``: its statistic for two recordings whose wander is known. The wander is the spread between recordings, of the fleet's table or
 the usual one. The threshold is that of a trend with one recording a day.
 
-As in a trend, one or two estimates that are off are no change: a parameter has left its interval when that many estimates of stretches without a
-common sample say so one after another.
+As in a trend, one or two outlying estimates are no change. A parameter has left its interval when AGREEING consecutive estimates, from stretches
+without a common sample, say so.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ A_MONTH = MONTH  # recordings: one a day
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """One parameter then and now.
+    """One parameter at commissioning and now.
 
     before, now: its value at commissioning and in the newest stretch; low, high: 95 % interval of an unchanged axis, with the spread between
         recordings; part: now over before, minus 1
-    statistic: least log of the test's statistic of the newest ``AGREEING`` estimates; -inf before there are so many
-    left: it has left its interval; one_in: axis-months in which chance alone gives such evidence once
+    statistic: least log statistic of the newest ``AGREEING`` estimates; -inf before there are that many
+    left: True if it has left its interval; one_in: axis-months in which chance alone gives such evidence once
     """
 
     name: str
@@ -57,9 +57,9 @@ class Compared:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """What a stretch of data says.
+    """The results of a stretch of data.
 
-    parameters: name -> estimate, and log of the test's statistic; effects: of its model; units: name -> unit, where it is not that of commissioning
+    parameters: name -> estimate, and log of the test's statistic; effects: of its model; units: name -> unit, where it differs from commissioning
     """
 
     parameters: Mapping[str, tuple[Estimate, float]] = field(default_factory=dict)
@@ -68,10 +68,10 @@ class Stretch:
 
 
 class Baseline:
-    """The estimates of an axis at commissioning, and what is heard of it since.
+    """The estimates of an axis at commissioning, and those received since.
 
-    known: estimates at commissioning; spreads: between recordings, by column of the fleet's table, part of the value; column: of a parameter's name
-    effects: names of effects that models may have, where the models of different stretches may differ
+    known: estimates at commissioning; spreads: between recordings, by table column, fraction of the value; column: maps a parameter name to a column
+    effects: names of effects that models may contain, if models of different stretches may differ
     """
 
     def __init__(
@@ -84,9 +84,9 @@ class Baseline:
         self._newest = (-math.inf, -math.inf)
 
     def hear(self, estimates: Iterable[Estimate], begin: float, end: float) -> None:
-        """The estimates of a stretch of data. begin, end: of it, in s or in samples.
+        """Add the estimates of a stretch of data. begin, end: of the stretch, in s or in samples.
 
-        They take the place of other estimates of the same stretch; a stretch that overlaps the one before it is left out.
+        They replace other estimates of the same stretch. A stretch that overlaps the previous one is ignored.
         """
         again = (begin, end) == self._newest
         if begin < self._newest[1] and not again:
@@ -99,21 +99,21 @@ class Baseline:
         self._newest = (begin, end)
 
     def compared(self, axis_months: float) -> tuple[Compared, ...]:
-        """Every parameter that the baseline and the newest stretch have."""
+        """Comparison of every parameter that the baseline and the newest stretch both have."""
         newest = self._newest_stretch.parameters
         level = math.log(axis_months * A_MONTH * max(len(newest), 1))
         return tuple(self._compared(item, level, axis_months) for item, _ in newest.values())
 
     @property
     def other_units(self) -> Mapping[str, tuple[str, str]]:
-        """By name the units, at commissioning and in the newest stretch, of parameters that are not compared, since these are not the same."""
+        """Parameters that cannot be compared because their units differ: name -> (unit at commissioning, unit in the newest stretch)."""
         return {name: (self._known[name].unit, unit) for name, unit in self._newest_stretch.units.items()}
 
     @property
     def other_effects(self) -> Mapping[str, int]:
-        """Effects that the model of the newest stretch has and that of commissioning lacks, or the reverse: in how many stretches one after another.
+        """Effects that only one of the two models (newest stretch, commissioning) has -> number of consecutive stretches.
 
-        The number is negative for an effect that the model of today lacks.
+        The number is negative for an effect that is missing in the newest model.
         """
         found = {}
         for effect in sorted(self._newest_stretch.effects ^ self._effects if self._heard else ()):
@@ -131,11 +131,11 @@ class Baseline:
 
     @property
     def stretches(self) -> int:
-        """That were heard, up to ``AGREEING``."""
+        """Number of received stretches, at most ``AGREEING``."""
         return len(self._heard)
 
     def cause(self, items: Iterable[Compared], known: Causes) -> Cause | None:
-        """The likeliest cause of what has left its interval; None where the table has none."""
+        """The likeliest cause of the parameters that left their interval; None if the table has none."""
         return known.likeliest([(self._column(item.name), "up" if abs(item.now) > abs(item.before) else "down") for item in items if item.left])
 
     def _history(self, *items: Estimate) -> History:
@@ -168,7 +168,7 @@ class Baseline:
 
 
 def compare(series: Series, spread: float) -> float:
-    """Log of the statistic of Shiryaev and Roberts after the second of two recordings whose wander is known. spread: its standard deviation."""
+    """Log of the Shiryaev-Roberts statistic after the second of two recordings with known wander. spread: its standard deviation."""
     told = Series(series.time, series.value, np.hypot(series.sigma, spread))
     found = evidence(told)[0]
     return float(logsumexp(_still() + found.none[:, -1] + found.change[:, -1]) - logsumexp(_still() + found.none[:, -1]))
@@ -176,10 +176,10 @@ def compare(series: Series, spread: float) -> float:
 
 @cache
 def _still() -> FloatArray:
-    """(g,) log weights of a grid of wanders of which only the least is possible."""
+    """(g,) log weights of a grid of wanders in which only the smallest is possible."""
     return np.array([0.0 if one.spread == SPREADS[0] and not one.slow else -np.inf for one in grid()])
 
 
 def finite(item: Estimate) -> bool:
-    """It has a value, and no interval without an end."""
+    """True if the value and both ends of the interval are finite."""
     return math.isfinite(item.value) and not any(math.isinf(end) for end in (item.low, item.high))

@@ -1,4 +1,4 @@
-"""What has left its interval since commissioning, as a status of a node."""
+"""The parameters that have left their interval since commissioning, as a status of a node."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from xy_sysid.fleets.causes import Causes
 from xy_sysid.live.plain_messages import OK, WARN, StatusMessage
 from xy_sysid.units import readable
 
-ONCE = 1e9  # axis-months beyond which the number itself says nothing more
+ONCE = 1e9  # axis-months; above this the exact number carries no information
 
 
 def status(axis: str, baseline: Baseline, known: Causes, axis_months: float) -> StatusMessage:
-    """``baseline <axis>``: WARN where a parameter has left its interval or is not compared, else OK; before enough is heard it says so.
+    """``baseline <axis>``: WARN if a parameter has left its interval or cannot be compared, else OK; it says so while there are too few data.
 
-    axis_months: of an unchanged axis, in which one false alarm is allowed
+    axis_months: months of an unchanged axis per false alarm
     """
     every = baseline.compared(axis_months)
     left = [item for item in every if item.left]
@@ -35,7 +35,7 @@ def status(axis: str, baseline: Baseline, known: Causes, axis_months: float) -> 
 
 
 def _unlike(baseline: Baseline) -> Iterator[str]:
-    """Why parameters of today are not those of commissioning."""
+    """Reasons why the newest parameters cannot be compared with those of commissioning."""
     for name, (before, now) in baseline.other_units.items():
         yield f"{name} is not compared, since its unit was {before or '1'} at commissioning and is {now or '1'}"
     other = baseline.other_effects

@@ -1,4 +1,4 @@
-"""Changes that come together -> the likely cause: a table that users can extend."""
+"""From simultaneous changes to the likely cause: a table that users can extend."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DIRECTIONS = ("up", "down", "changed")
 
 
 class Cause(Settings):
-    """One cause, and how it shows itself."""
+    """One cause and its signs."""
 
     cause: str = knob("", "what may have happened")
     when: list[str] = knob([], "changes that must all be there: QUANTITY up, down or changed")
@@ -37,19 +37,19 @@ class Causes(Settings):
         return next((name for name, patterns in self.quantities.items() if any(fnmatchcase(column, one) for one in patterns)), column)
 
     def likeliest(self, moves: Moves) -> Cause | None:
-        """The cause that explains most of what moved; moves: (column, direction). None where none explains anything."""
+        """The cause that explains most of the changes; moves: (column, direction). None if no cause explains any."""
         seen = {(self.quantity(column), direction) for column, direction in moves}
         fitting = [one for one in self.causes if all(_seen(change, seen) for change in one.when)]
         return max(fitting, key=lambda one: (sum(_explains(one, move) for move in seen), len(one.when)), default=None)
 
 
 def causes(own: Path | None = None) -> Causes:
-    """The table of the package, with the quantities and causes of a user's file before it. Raises BadRecording or BadInput."""
+    """The package's table, preceded by the quantities and causes of a user's file. Raises BadRecording or BadInput."""
     ours = _read(OURS)
     if own is None:
         return ours
     theirs = _read(own)
-    quantities = {**theirs.quantities, **ours.quantities, **theirs.quantities}  # theirs are tried first, and theirs hold
+    quantities = {**theirs.quantities, **ours.quantities, **theirs.quantities}  # the user's patterns are tried first and take precedence
     both = Causes(quantities=quantities, causes=[*theirs.causes, *ours.causes])
     for one in theirs.causes:
         if not one.when:

@@ -1,15 +1,15 @@
 """Has a parameter changed, when, and by how much? Bayesian sequential detection of a change in a series of estimates.
 
-Each estimate is level + wander + error. The error is the recording's own, known from its interval. The wander is what temperature, load and
-lubrication do between recordings: a Gaussian process with standard deviation tau, a part of which is slow: its correlation falls as
-exp(-distance / length). None of this is known, so all wanders of a grid are weighed by how well they explain the series, and the series of all
-other axes of the table. A change begins after some recording and takes no time or several recordings. Its size is Gaussian, with a standard
-deviation that is again one of a grid. For each beginning the likelihood ratio to no change has a closed form: the model is linear and Gaussian,
+Each estimate is level + wander + error. The error is the recording's own and is known from its interval. The wander is the effect of temperature,
+load and lubrication between recordings: a Gaussian process with standard deviation tau. A part of it is slow: its correlation falls as
+exp(-distance / length). None of this is known. Therefore all wanders of a grid are weighted by how well they explain the series and the series of
+all other axes of the table. A change starts after a recording and takes no time or several recordings. Its size is Gaussian, with a standard
+deviation from another grid. For each start the likelihood ratio to no change has a closed form: the model is linear and Gaussian,
 and level and size are integrated out.
 
-The sum of the ratios over all beginnings is the statistic of Shiryaev and Roberts. Without a change it is n after n recordings, on average over
-the grid. So a threshold c is passed at most once in c recordings: it follows from the rate of false alarms that is allowed. One recording that
-is off, or two in a row (another load, a loose cable), belong to no change: so it takes a third recording to declare a change with most rates.
+The sum of the ratios over all starts is the Shiryaev-Roberts statistic. Without a change its mean is n after n recordings, on average over
+the grid. Therefore a threshold c is passed at most once in c recordings. The allowed rate of false alarms gives c. One outlying recording,
+or two in a row (another load, a loose cable), are not a change: at most rates a change needs a third recording to be declared.
 
 Sources: Roberts, A comparison of some control chart procedures, Technometrics 8 (1966); Pollak & Siegmund, Approximations to the expected
 sample size of certain sequential tests, Ann. Statist. 3 (1975); Shin, Ramdas & Rinaldo, E-detectors, New England J. Statist. Data Sci. 2 (2023).
@@ -26,17 +26,17 @@ from xy_sysid.fleets.wander import SIZES, Series, Whitened, grid, usual, whitene
 from xy_sysid.samples.block import FloatArray
 
 DURATIONS = (0.0, 5.0, 20.0, 80.0)  # of a change, usual distances between recordings
-ODD = 0.01  # probability that a recording is off; that the next one is off, too, is as probable again
-SURE = 0.99  # probability from which a recording counts as off once and for all
-UNLIMITED = 1.0  # standard error, part of the level, of what is off
-LONGEST = 200  # recordings that are looked at together; of longer series the older half is let go
+ODD = 0.01  # probability of an outlying recording; the probability that the next one is an outlier, too, is this once more
+SURE = 0.99  # probability from which a recording counts permanently as an outlier
+UNLIMITED = 1.0  # standard error of an outlier, as a fraction of the level
+LONGEST = 200  # recordings analysed together; of a longer series the older half is dropped
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
     """The evidence of a series, for each wander of the grid (g of them) after each recording (n).
 
-    none: (g, n) log likelihood without a change; odd: (g, n) log factor by which single recordings that are off raise it
+    none: (g, n) log likelihood without a change; odd: (g, n) log factor by which single outlying recordings raise it
     change: (g, n) log of the sum of the likelihood ratios of all changes
     """
 
@@ -81,7 +81,7 @@ def evidence(series: Series) -> tuple[Evidence, Series]:
 
 
 def _evidence(series: Series) -> tuple[Evidence, tuple[int, ...]]:
-    """The evidence, and the numbers of the recordings that are certain outliers."""
+    """The evidence, and the indices of the certain outliers."""
     n, changed, every = series.value.size, _first_change(series), grid()
     shapes = hypotheses(series.time)
     none, odd, change = (np.full((len(every), n), -np.inf) for _ in range(3))
@@ -91,21 +91,21 @@ def _evidence(series: Series) -> tuple[Evidence, tuple[int, ...]]:
         none[row] = parts.none
         each, change[row] = weighed(parts, shapes)
         odd[row] = np.log1p(each.sum(axis=0))
-        with np.errstate(divide="ignore"):  # of what has not begun
+        with np.errstate(divide="ignore"):  # of changes that have not started
             off = np.logaddexp(off, usual()[row] + parts.none + np.log(each))
     prior = usual()[:, None] + none
     share = np.exp(off - logsumexp(np.logaddexp(prior + odd, prior + change + np.log(ODD)), axis=0))
-    share[np.arange(n), np.arange(n)] = 0.0  # a recording is off only in the light of one after it
+    share[np.arange(n), np.arange(n)] = 0.0  # later recordings are needed to call one an outlier
     share[np.arange(n, changed), np.arange(1, n)] = 0.0
     sure = [int(place) for place in np.flatnonzero(share.max(axis=1) > SURE)]
     return Evidence(none, odd, change), tuple(sorted({k for place in sure for k in ((place,) if place < n else (place - n, place - n + 1))}))
 
 
 def weighed(parts: Whitened, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What a series says for one wander: (2 n - 1, n) likelihood ratios of one recording or two that are off, times their probability; and (n,) log
-    of the sum of the ratios of all changes.
+    """For one wander: (2 n - 1, n) likelihood ratios of one or two outlying recordings, times their probability; and (n,) log of the sum of the
+    ratios of all changes.
 
-    shapes: of ``hypotheses``, of which parts has the whitened ones
+    shapes: from ``hypotheses``; parts holds the whitened shapes
     """
     n = shapes.shape[0]
     ratios = parts.ratios(np.argmax(shapes != 0.0, axis=0))
@@ -116,20 +116,20 @@ def weighed(parts: Whitened, shapes: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def statistic(found: Evidence, weights: FloatArray) -> FloatArray:
-    """(n,) log of Shiryaev and Roberts' statistic after each recording."""
+    """(n,) log of the Shiryaev-Roberts statistic after each recording."""
     none = weights[:, None] + found.none
     return np.asarray(logsumexp(none + found.change, axis=0) - logsumexp(none + found.odd, axis=0))
 
 
 def spread(series: Series, weights: FloatArray) -> tuple[float, FloatArray]:
-    """Standard deviation of the wander of a series without a change, and (g,) how likely each wander of the grid is."""
+    """Standard deviation of the wander of a series without a change, and (g,) the probability of each wander of the grid."""
     none = np.array([whitened(series, wander, np.zeros((series.value.size, 0))).none[-1] for wander in grid()])
     share = np.exp(weights + none - logsumexp(weights + none))
     return float(np.sqrt(sum(part * wander.spread**2 for part, wander in zip(share, grid(), strict=True)))), share
 
 
 def changes(series: Series, weights: FloatArray, threshold: float, known: Evidence | None = None) -> tuple[Change, ...]:
-    """Every change of a series, in order; threshold: log of the statistic from which a change is declared; known: its evidence, if it is."""
+    """Every change of a series, in order; threshold: log statistic that declares a change; known: the series' evidence if already computed."""
     if known is not None and series.value.size <= LONGEST and not np.any(statistic(known, weights) >= threshold):
         return ()
     found: list[Change] = []
@@ -140,11 +140,11 @@ def changes(series: Series, weights: FloatArray, threshold: float, known: Eviden
         declared = _passed(seen, weights, threshold)
         if declared is not None:
             change = _located(part, weights)
-            if _passed(evidence(_without(part, change))[0], weights, threshold) is not None:  # there is more than one
+            if _passed(evidence(_without(part, change))[0], weights, threshold) is not None:  # there is more than one change
                 change = _alone(part, declared, weights, threshold)
             found.append(_moved(change, start, start + declared))
             ended = int(np.searchsorted(part.time, part.time[change.after] + change.duration))
-            start += max(ended, change.after + 1)  # what follows is compared with what came after the change
+            start += max(ended, change.after + 1)  # compare the following data with those after this change
         elif series.value.size - start > LONGEST:
             start += LONGEST // 2
         else:
@@ -153,7 +153,7 @@ def changes(series: Series, weights: FloatArray, threshold: float, known: Eviden
 
 
 def _alone(series: Series, declared: int, weights: FloatArray, threshold: float) -> Change:
-    """The first change of a series that has more, from as many recordings as it explains alone."""
+    """The first of several changes of a series, from the recordings that it explains alone."""
     change, more = _located(series.until(declared + 1), weights), 1
     while declared + 1 + more < series.value.size:
         part = series.until(declared + 1 + more)
@@ -165,7 +165,7 @@ def _alone(series: Series, declared: int, weights: FloatArray, threshold: float)
 
 
 def _passed(found: Evidence, weights: FloatArray, threshold: float) -> int | None:
-    """The recording with which a change is declared."""
+    """Index of the recording at which a change is declared; None without one."""
     passed = np.flatnonzero(statistic(found, weights) >= threshold)
     return int(passed[0]) if passed.size else None
 
@@ -176,12 +176,12 @@ def _without(series: Series, change: Change) -> Series:
 
 
 def _moved(change: Change, by: int, declared: int) -> Change:
-    """The same in numbers of a longer series."""
+    """The change with indices in a longer series."""
     return replace(change, after=change.after + by, first=change.first + by, last=change.last + by, declared=declared)
 
 
 def _located(series: Series, weights: FloatArray) -> Change:
-    """When the one change of a series was, and its size until now; the final size of a change that still goes on is unknown."""
+    """Date and size of the single change of a series; if it still continues, the size is the present one and the final size is unknown."""
     n, first = series.value.size, _first_change(series)
     shapes = hypotheses(series.time)
     now = shapes[-1, first:]
@@ -213,19 +213,19 @@ def _located(series: Series, weights: FloatArray) -> Change:
 
 
 def _first_change(series: Series) -> int:
-    """Number of the first change among the shapes."""
+    """Index of the first change among the shapes."""
     return 2 * series.value.size - 1
 
 
 def hypotheses(time: FloatArray) -> FloatArray:
-    """(n, 2 n - 1 + (n - 1) durations): a recording that is off, two in a row, and each change, by duration and by the recording after which it
-    begins."""
+    """(n, 2 n - 1 + (n - 1) durations) shapes: one outlying recording, two in a row, and each change, by duration and by the recording after which
+    it starts."""
     changed = [_shape(time, after, duration) for duration in DURATIONS for after in range(time.size - 1)]
     single = np.eye(time.size)
     return np.column_stack((single, single[:, :-1] + single[:, 1:], *changed))
 
 
 def _shape(time: FloatArray, after: int, duration: float) -> FloatArray:
-    """(n,) from 0 to 1: a change that begins after a recording."""
+    """(n,) from 0 to 1: a change that starts after a recording."""
     since = time - time[after]
     return np.clip(since / duration, 0.0, 1.0) if duration else np.asarray(since > 0.0, dtype=np.float64)

@@ -1,6 +1,6 @@
-"""Every column of the fleet's table: its name, what it holds, its unit, and what it means.
+"""Every column of the fleet's table: its name, type, unit and meaning.
 
-All columns are flat (numbers, text, true or false, one date), so that every reader of Parquet takes them.
+All columns are flat (numbers, text, booleans, one date), so that every Parquet reader accepts them.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from xy_sysid.axis.model import STANDARD, Library
 
 Kind = Literal["text", "number", "count", "truth", "date"]
 ROOTS = 3  # resonances and antiresonances that have columns, lowest frequency first
-TIMES = ("seconds_reading", "seconds_fit", "seconds_diagnosis")  # the only columns that differ between two runs of the same version
+TIMES = ("seconds_reading", "seconds_fit", "seconds_diagnosis")  # the only columns that differ between two runs of one version
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column. unit: SI, V and m stand for the units of the axis' input and output; trended: ``xy-sysid trend`` follows it."""
+    """One column. unit: SI; V and m stand for the units of the axis's input and output; trended: True if ``xy-sysid trend`` follows it."""
 
     name: str
     kind: Kind
@@ -80,12 +80,12 @@ _ORIGIN = (
 
 
 def columns(library: Library = STANDARD) -> tuple[Column, ...]:
-    """The columns in their order, with those of every parameter of a library."""
+    """All columns in order, including those of every parameter of a library."""
     return (*_RECORDING, *_RESPONSE, *_linear(), *_DIAGNOSIS, *_parameters(library), *_ORIGIN)
 
 
 def column_of(parameter: str) -> str:
-    """The column of a parameter: coulomb_friction.coulomb stands in coulomb_friction_coulomb."""
+    """The column of a parameter: coulomb_friction_coulomb for coulomb_friction.coulomb."""
     return parameter.replace(".", "_")
 
 
@@ -105,7 +105,7 @@ def _parameters(library: Library) -> Iterator[Column]:
         yield from _interval(name, unit, f"{meaning} of the axis model", True)
     for effect in library.effects.values():
         for item in effect.parameters if effect.category != "base" else ():
-            whole_turn = item.unit == "rad"  # a phase has no size that could grow
+            whole_turn = item.unit == "rad"  # a phase has no magnitude that could grow
             yield from _interval(column_of(f"{effect.name}.{item.name}"), item.unit, f"{effect.name}: {item.meaning}", not whole_turn)
 
 

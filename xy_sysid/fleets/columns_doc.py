@@ -6,11 +6,11 @@ from xy_sysid.axis.model import STANDARD
 from xy_sysid.fleets.columns import ROOTS, Column, columns
 
 BEGIN, END = "<!-- made from xy_sysid/fleets/columns -->\n", "<!-- end -->\n"
-SHOWN = ("coulomb_friction_coulomb",)  # of all parameters of all effects
+SHOWN = ("coulomb_friction_coulomb",)  # the only effect parameters in the table, as an example
 
 
 def document() -> str:
-    """The table, between its marks: of resonances the first, of the parameters of effects an example."""
+    """The table between its marks, with the first resonance and one effect parameter as examples."""
     rows = "".join(f"| `{item.name}` | {item.unit} | {item.meaning} |\n" for item in columns() if _shown(item))
     return f"{BEGIN}| column | unit | meaning |\n|---|---|---|\n{rows}{END}"
 
@@ -25,7 +25,7 @@ def _shown(item: Column) -> bool:
 
 
 def with_table(page: str) -> str:
-    """A page with the table of today in the place of the old one."""
+    """A page with its table replaced by the current one."""
     before, _, rest = page.partition(BEGIN)
     return before + document() + rest.partition(END)[2]
 

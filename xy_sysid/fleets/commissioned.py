@@ -21,7 +21,7 @@ Known = tuple[Estimate, ...]
 
 
 def of_transfer_functions(path: Path) -> Mapping[str, tuple[TransferFunction, Known]]:
-    """By axis the transfer function of a file of ``fit --model``, and the estimates of gain, delay and resonances.
+    """For each axis the transfer function of a file of ``fit --model``, and the estimates of gain, delay and resonances.
 
     Raises BadRecording or BadInput in one line for any other file.
     """
@@ -39,7 +39,7 @@ def of_transfer_functions(path: Path) -> Mapping[str, tuple[TransferFunction, Kn
 
 
 def of_axis_models(path: Path, library: Library) -> Mapping[str, Known]:
-    """By axis the parameters of a file of ``refine --model``, with their intervals. Raises BadRecording or BadInput for any other file."""
+    """For each axis the parameters of a file of ``refine --model``, with their intervals. Raises BadRecording or BadInput for any other file."""
     unlike = {item.name for item in columns(library) if not item.trended}
     found = {}
     for axis, model in read_models(path, library).items():
@@ -50,12 +50,12 @@ def of_axis_models(path: Path, library: Library) -> Mapping[str, Known]:
 
 
 def compared(name: str) -> bool:
-    """Whether an estimate of a transfer function is compared: gain, delay, and the frequencies of resonances and antiresonances."""
+    """True for the compared estimates of a transfer function: gain, delay, and the frequencies of resonances and antiresonances."""
     return name in ("gain", "delay") or ("resonance_" in name and name.endswith(".frequency"))
 
 
 def spreads(table: Path) -> Mapping[str, float]:
-    """By column, the median spread between recordings of the axes of a fleet's table. Raises BadRecording or BadInput."""
+    """For each column, the median spread between recordings over the axes of a fleet's table. Raises BadRecording or BadInput."""
     return {column: between for column, between, _ in widest(trend(table))}
 
 

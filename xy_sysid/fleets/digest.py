@@ -1,4 +1,4 @@
-"""A file or a folder -> the hash of what is in it, whatever it is called and wherever it lies."""
+"""Hash of the content of a file or a folder, independent of its name and place."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from xy_sysid.bags.opening import regular_file
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file; of a folder that of its files' names and hashes, in the order of their names. Raises OSError, or BadRecording for a pipe."""
+    """SHA-256 of a file; for a folder, of the names and hashes of its files, sorted by name. Raises OSError, or BadRecording for a pipe."""
     if not path.is_dir():
         regular_file(path)
         with path.open("rb") as file:

@@ -1,6 +1,6 @@
 """Tasks -> their results, on the processes of a dask cluster: the cores of this machine, or an existing scheduler.
 
-A task whose process dies is tried once more at the end, alone, so that no other can be the reason; if its process dies again, that is its row.
+A task whose process dies is tried once more at the end, alone, so that no other task can be the reason. If its process dies again, its row says so.
 """
 
 from __future__ import annotations
@@ -22,29 +22,29 @@ if TYPE_CHECKING:
     from distributed import Client
 
 AHEAD = 2  # tasks for each process that the scheduler has at a time
-PATIENCE = 10.0  # s until a scheduler must answer
+PATIENCE = 10.0  # s to wait for an answer of a scheduler
 DIED = (
     "its process died twice while it was analysed (too little memory?). As long as file, options and version are the same it is not tried again. "
     "Analyse it alone: xy-sysid fleet --one FILE."
 )
 HERE = {
-    "distributed.scheduler.allowed-failures": 0,  # a task whose process died is blamed at once
+    "distributed.scheduler.allowed-failures": 0,  # a task whose process died is reported at once
     "distributed.scheduler.worker-saturation": 1.0,  # one task a process
     "distributed.worker.profile.enabled": False,  # it keeps the stacks of an hour, 100 MB and more
-    "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,  # dask itself says so to BLAS
+    "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,  # as dask itself sets for BLAS
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """Where tasks are worked on. workers: processes on this machine, 0 for one a core; scheduler: address of another, tcp://HOST:PORT."""
+    """Where tasks run. workers: processes on this machine, 0 for one per core; scheduler: address of an existing one, tcp://HOST:PORT."""
 
     workers: int = 0
     scheduler: str = ""
 
 
 def dask() -> Any:
-    """The module ``distributed``. Raises MissingExtra where it is not installed."""
+    """The module ``distributed``. Raises MissingExtra if it is not installed."""
     try:
         import distributed
     except ImportError:
@@ -54,7 +54,7 @@ def dask() -> Any:
 
 @contextmanager
 def connected(where: Cluster) -> Iterator[Client]:
-    """A client of the cluster; processes of this machine end with it. Raises BadInput where no scheduler answers."""
+    """A client of the cluster; processes on this machine end with it. Raises BadInput if the scheduler does not answer."""
     distributed = dask()
     if where.scheduler:
         try:
@@ -78,7 +78,7 @@ def connected(where: Cluster) -> Iterator[Client]:
 
 @contextmanager
 def _own_environment() -> Iterator[None]:
-    """This process has its environment again at the end: dask gives it that of its workers."""
+    """Restore this process's environment at the end: dask overwrites it with that of its workers."""
     before = dict(os.environ)
     try:
         yield
@@ -95,7 +95,7 @@ def processes(client: Client) -> int:
 
 
 def results(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Done, float]]:
-    """The result of each task with its duration, s, in the order in which they end; only a few tasks wait at the scheduler at a time."""
+    """(result, duration in s) of each task in order of completion; only a few tasks wait at the scheduler at a time."""
     waiting, doubtful = iter(tasks), list[Task]()
     yield from _window(client, waiting, lambda: AHEAD * processes(client), doubtful)
     blamed = list[Task]()
@@ -105,7 +105,7 @@ def results(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Done, float
 
 
 def _window(client: Client, waiting: Iterator[Task], ahead: Callable[[], int], died: list[Task]) -> Iterator[tuple[Done, float]]:
-    """The results of tasks of which so many are at the scheduler, more when a cluster grows; those whose process died are put aside."""
+    """Results of tasks, at most ``ahead()`` of them at the scheduler (more when a cluster grows). Tasks whose process died are added to ``died``."""
     distributed = dask()
     running: dict[Any, Task] = {}
     ended = distributed.as_completed()
@@ -133,7 +133,7 @@ def _window(client: Client, waiting: Iterator[Task], ahead: Callable[[], int], d
 
 
 def timed(task: Task) -> tuple[Done, float]:
-    """The rows of a recording and the s that it took, in whatever process."""
+    """The rows of a recording and the duration in s; runs in any process."""
     from time import perf_counter
 
     begun = perf_counter()

@@ -1,4 +1,4 @@
-"""How fast a run goes, and how long the rest of it will take."""
+"""Speed and remaining time of a run."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from xy_sysid.response.frf import Z95
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is.
+    """Progress of a run.
 
-    done, total: recordings, with ``unchanged`` ones, which the table had already, and ``failed`` ones, which are rows without an answer
-    elapsed: s since the first recording was begun; spent, square: sum of the times that the done ones took, s, and of their squares
+    done, total: recordings, including ``unchanged`` ones, which are already in the table, and ``failed`` ones, whose rows have no answer
+    elapsed: s since the first recording started; spent, square: sum of the durations of the done ones, s, and of their squares
     workers: processes at work; place: address of the dashboard, if there is one
     """
 
@@ -29,27 +29,27 @@ class Progress:
 
     @property
     def analysed(self) -> int:
-        """Recordings that were not in the table already."""
+        """Number of recordings that were not already in the table."""
         return self.done - self.unchanged
 
     @property
     def rate(self) -> float:
-        """Recordings an hour that are analysed."""
+        """Analysed recordings per hour."""
         return 3600.0 * self.analysed / self.elapsed if self.elapsed > 0.0 else 0.0
 
     def remaining(self) -> tuple[float, float] | None:
-        """95 % interval of the time that the rest takes, s, if all of it has to be analysed and is like what is done; None for less than three."""
+        """95 % interval of the remaining time, s, if all of the rest must be analysed and takes as long as before; None for fewer than three."""
         count, rest = self.analysed, self.total - self.done
         if count < 3 or self.elapsed <= 0.0:
             return None
         mean = self.spent / count
         spread = math.sqrt(max(self.square / count - mean**2, 0.0) * count / (count - 1))
         width = Z95 * spread * math.sqrt(rest / count + 1.0) * math.sqrt(rest) if rest else 0.0
-        share = self.elapsed / max(self.spent, 1e-9)  # s of the clock for each s of work
+        share = self.elapsed / max(self.spent, 1e-9)  # s of elapsed time per s of work
         return max(rest * mean - width, 0.0) * share, (rest * mean + width) * share
 
     def sentence(self) -> str:
-        """The same in words."""
+        """The progress in words."""
         parts = [f"{self.done} of {self.total} recordings"]
         if self.unchanged:
             parts.append(f"{self.unchanged} were in the table already")
@@ -64,7 +64,7 @@ class Progress:
 
 
 def lasting(seconds: float) -> str:
-    """A time in the largest unit of which it has two, as people read it."""
+    """A duration in the largest unit of which it has at least two."""
     for size, name in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.0f} {name}"

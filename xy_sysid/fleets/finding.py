@@ -8,17 +8,17 @@ from pathlib import Path
 from xy_sysid.errors import BadInput
 from xy_sysid.imports.registry import BAGS, TABLES
 
-UNASKED = (".json", ".jsonl", ".ndjson", ".txt", ".log", ".prn", ".parquet")  # in a folder these are mostly something else
+UNASKED = (".json", ".jsonl", ".ndjson", ".txt", ".log", ".prn", ".parquet")  # in a folder these are rarely recordings
 ENDINGS = tuple(ending for ending in (*BAGS, *TABLES) if ending and ending not in UNASKED)
 METADATA = "metadata.yaml"
 
 
 def recordings(paths: Iterable[Path | str], besides: Path | None = None) -> tuple[Path, ...]:
-    """Every recording once, in the order of their absolute paths.
+    """Every recording once, sorted by absolute path.
 
-    paths: recordings; folders, which are searched for bags and for files whose ending is one of ``ENDINGS``; or patterns like data/*/2026*.csv
+    paths: recordings; folders, which are searched for bags and for files with one of ``ENDINGS``; or patterns like data/*/2026*.csv
     besides: a folder that is not searched (the table itself)
-    Raises BadInput for a path that is not there, or where there is no recording.
+    Raises BadInput for a path that does not exist, or if there is no recording.
     """
     found: dict[Path, None] = {}
     given = [Path(path).absolute() for path in paths]
@@ -49,7 +49,7 @@ def _below(path: Path, besides: Path | None) -> Iterator[Path]:
 
 
 def _matching(pattern: Path) -> list[Path]:
-    """What a pattern matches; nothing if it is none."""
+    """Paths that match a pattern; none if it is not a pattern."""
     fixed = next((number for number, part in enumerate(pattern.parts) if any(sign in part for sign in "*?[")), None)
     if fixed is None:
         return []

@@ -1,4 +1,4 @@
-"""The table -> the series of each parameter of each axis, as numbers that changes can be looked for in."""
+"""From the table to the series of each parameter of each axis, in which changes are looked for."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
 DAY = 86400.0  # s
-BEGIN = datetime(1970, 1, 1, tzinfo=UTC)  # where no clock tells the date: of a recording that is looked at in parts
+BEGIN = datetime(1970, 1, 1, tzinfo=UTC)  # used if no clock gives the date, for a recording that is analysed in parts
 MONTH = 30.4375  # days
-FEWEST = 4  # recordings with a value, below which nothing is said
-ONE_STEP = ("held_out_error", "noise")  # of a model that is judged one sample ahead they are not what they are of any other
+FEWEST = 4  # recordings with a value; a shorter series is not analysed
+ONE_STEP = ("held_out_error", "noise")  # for a one-step prediction these have another meaning and are not compared
 
 
 @dataclass(frozen=True, slots=True)
 class History:
     """One parameter of one axis.
 
-    column, unit: of the table; dates: (n,); value, low, high: (n,) in this unit, NaN where there is no interval
-    logarithmic: changes are looked for in the logarithm; level: what a value is divided by otherwise
+    column, unit: of the table; dates: (n,); value, low, high: (n,) in this unit, NaN without an interval
+    logarithmic: changes are looked for in the logarithm; level: otherwise values are divided by it
     """
 
     column: str
@@ -40,7 +40,7 @@ class History:
 
     @property
     def series(self) -> Series:
-        """As parts of the level, over the usual distance between recordings."""
+        """The series as fractions of the level, over the usual distance between recordings."""
         value, width = self.value, self.high - self.low
         if self.logarithmic:
             known = np.where(self.low > 0.0, self.low, np.nan)
@@ -51,23 +51,23 @@ class History:
         return Series(steps(self.dates), np.log(value) if self.logarithmic else value / self.level, np.nan_to_num(sigma))
 
     def plain(self, part: Any) -> Any:
-        """Values in the unit, of parts of the level; infinite where that is too large for a number, as an end of an interval that knows nothing."""
+        """Convert fractions of the level to the unit; an overflow gives infinity, for example as an end of an uninformative interval."""
         with np.errstate(over="ignore"):
             return np.exp(part) if self.logarithmic else part * self.level
 
     def changed(self, value: float, part: float) -> float:
-        """A value after a change by so much of the level."""
+        """The value after a change by this fraction of the level."""
         return value * float(np.exp(part)) if self.logarithmic else value + part * self.level
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """All that the table tells of one axis over time.
+    """The table's content for one axis over time.
 
-    units: of input and output, of its last recording with an answer; dates: (n,) of its recordings in these units
+    units: of input and output in its last recording with an answer; dates: (n,) of its recordings in these units
     histories: of every parameter with enough values; named: effect -> (n,) whether it was named
-    left_out: recordings without a date, or without an answer; other_units: with an answer in other units, left out, too
-    silent: its newest recordings, none of which has an answer
+    left_out: number of recordings without a date or an answer; other_units: number with an answer in other units, also left out
+    silent: number of its newest recordings without an answer
     """
 
     machine: str
@@ -82,18 +82,18 @@ class Axis:
 
     @property
     def months(self) -> float:
-        """From the first recording to the last."""
+        """Months from the first recording to the last."""
         return (self.dates[-1] - self.dates[0]).total_seconds() / DAY / MONTH if self.dates else 0.0
 
     @property
     def tests(self) -> int:
-        """Series in which a change is looked for."""
+        """Number of series in which a change is looked for."""
         return len(self.histories) + len(self.named)
 
 
 @dataclass(frozen=True, slots=True)
 class Unread:
-    """Recordings of a machine that could not be read. newest: none that was read is as new as the last of them."""
+    """Recordings of a machine that could not be read. newest: True if no readable recording is as new as the last of them."""
 
     machine: str
     recordings: int
@@ -101,7 +101,7 @@ class Unread:
 
 
 def unread(rows: Sequence[Mapping[str, Any]]) -> tuple[Unread, ...]:
-    """Every machine with recordings that could not be read: their rows name no axis."""
+    """Every machine with unreadable recordings; their rows name no axis."""
     found = []
     for machine in sorted({row["machine"] for row in rows if not row["axis"]}):
         own = [row for row in rows if row["machine"] == machine]
@@ -161,7 +161,7 @@ def _history(column: str, unit: str, rows: Sequence[Mapping[str, Any]]) -> Histo
 
 
 def _told(row: Mapping[str, Any], column: str) -> bool:
-    """There is a value, and it is not one whose interval has no end."""
+    """True if there is a value whose interval has finite ends."""
     value, low, high = row.get(column), row.get(f"{column}_low"), row.get(f"{column}_high")
     ends = [end for end in (low, high) if end is not None]
     return value is not None and np.isfinite(value) and bool(np.all(np.isfinite(ends))) and not (row.get("one_step") and column in ONE_STEP)

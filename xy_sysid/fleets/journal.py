@@ -1,4 +1,4 @@
-"""Rows that are not in the table yet: each is on the disk as soon as it is known, so that a run that is killed loses none.
+"""Rows that are not in the table yet. Each is written to disk at once, so that a killed run loses none.
 
 The journal is a file of JSON lines in the table's folder. It is locked while a run writes it: one run for a table at a time.
 """
@@ -20,24 +20,24 @@ from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import ENDING, merged
 
 FILE = ".journal.jsonl"  # readers of Parquet leave out names that begin with a dot
-MANY = 500  # rows after which they go into the table
+MANY = 500  # rows after which the journal is merged into the table
 
 
 class Journal:
-    """The rows of a run on their way into the table."""
+    """The rows of a run that wait to be merged into the table."""
 
     def __init__(self, folder: Path, file: IO[str], library: Library) -> None:
         self._folder, self._file, self._library = folder, file, library
         self._rows: list[Row] = []
         file.seek(0)
         for line in file:
-            with suppress(json.JSONDecodeError):  # the last line of a run that was killed while it wrote
+            with suppress(json.JSONDecodeError):  # an incomplete last line of a killed run
                 self._rows.append({name: _read(name, value) for name, value in json.loads(line).items()})
         self.fold()
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Keep the rows of a recording."""
-        self._rows += rows  # first, since Ctrl-C may end the writing, and the rows that are here go into the table
+        """Store the rows of a recording."""
+        self._rows += rows  # first: Ctrl-C may interrupt the writing, and these rows go into the table
         for row in rows:
             self._file.write(json.dumps({name: _written(value) for name, value in row.items()}) + "\n")
         self._file.flush()
@@ -46,7 +46,7 @@ class Journal:
             self.fold()
 
     def fold(self) -> None:
-        """Put all rows into the table, and begin again. Killed in between, it does so again: the same rows replace themselves."""
+        """Merge all rows into the table and clear the journal. After a kill it merges again; the same rows replace themselves."""
         if self._rows:
             merged(self._folder, self._rows, self._library)
         self._rows = []
@@ -56,9 +56,9 @@ class Journal:
 
 @contextmanager
 def journal(folder: Path, library: Library = STANDARD) -> Iterator[Journal]:
-    """The journal of a table, which is made if it is not there; at the end, however it comes, its rows are in the table.
+    """The journal of a table; the table is created if it does not exist. At the end, also after an error, its rows are in the table.
 
-    Raises BadInput where another run is at work on the table, BadRecording where it cannot be written.
+    Raises BadInput if another run works on the table, BadRecording if it cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -79,9 +79,9 @@ def journal(folder: Path, library: Library = STANDARD) -> Iterator[Journal]:
 
 
 def own_files(folder: Path) -> None:
-    """Raises BadRecording where a file that a run writes is a link or no file: it would change something outside of the table.
+    """Raises BadRecording if a file that a run writes is a link or not a regular file: the run would change something outside the table.
 
-    The journal is opened without following links, too, in case one comes there meanwhile.
+    The journal is also opened without following links, in case one is created meanwhile.
     """
     for path in (folder / FILE, *sorted(folder.glob(f"*{ENDING}"))):
         if path.is_symlink() or (path.exists() and not path.is_file()):

@@ -17,7 +17,7 @@ from xy_sysid.settings import Settings, build, knob
 ZONE = r"(?:Z|[+-]\d\d:\d\d|\+\d{4})"
 DATE = rf"(?<!\d)\d{{4}}[-_.]?\d\d[-_.]?\d\d(?:[T_ -]?\d\d[-_:]?\d\d(?:[-_:]?\d\d)?{ZONE}?)?(?!\d)"
 PARTS = {"{machine}": r"(?P<machine>[^/]+?)", "{axis}": r"(?P<axis>[^/]+?)", "{date}": f"(?P<date>{DATE})", "*": "[^/]*"}
-FIRST, LAST = datetime(2000, 1, 1, tzinfo=UTC), datetime(2100, 1, 1, tzinfo=UTC)  # a clock that counts from its start, or number, is no date
+FIRST, LAST = datetime(2000, 1, 1, tzinfo=UTC), datetime(2100, 1, 1, tzinfo=UTC)  # dates outside count from another start
 EXAMPLE = "{machine}/{date}*.csv"
 
 
@@ -41,8 +41,8 @@ class Names(Settings):
 class Name:
     """The name of a recording.
 
-    axis: of a file that holds one, empty where the file's own names stand; date: UTC, None if unknown
-    said: the machine was named by a list or a pattern; else it is the folder, and what the recording itself says is better
+    axis: if the file holds a single one; empty if the file's own names apply; date: UTC, None if unknown
+    said: True if a list or a pattern names the machine; otherwise it is the folder's name, and a name in the recording takes precedence
     """
 
     machine: str
@@ -68,14 +68,14 @@ def names_from(path: Path) -> Names:
 
 
 def _dated(value: Any) -> Any:
-    """YAML makes a date of 2026-03-03 by itself."""
+    """The value as text: YAML converts 2026-03-03 to a date."""
     return {key: one if isinstance(one, str) else str(one) for key, one in value.items()} if isinstance(value, dict) else value
 
 
 def name_of(path: Path, names: Names) -> Name:
-    """The name that a list or the path gives; without a pattern the folder is the machine, and the first date in the file's name its date.
+    """The name from a list or the path. Without a pattern the folder is the machine, and the first date in the file name is the date.
 
-    Raises BadInput where the path does not fit the pattern, or what is said to be a date is none.
+    Raises BadInput if the path does not match the pattern, or a given date is invalid.
     """
     whole = path.absolute().as_posix()
     said = next((one for end, one in names.recordings.items() if whole == end or whole.endswith(f"/{end}")), None)
@@ -105,7 +105,7 @@ def _said_date(text: str) -> datetime | None:
 
 
 def _date_in(name: str) -> datetime | None:
-    """The first date in the name of a file; other numbers are none."""
+    """The first date in the name of a file; None if it has none."""
     for found in re.finditer(f"(?=({DATE}))", name):
         with suppress(BadInput):
             if FIRST <= (date := date_of(found.group(1))) < LAST:
@@ -114,7 +114,7 @@ def _date_in(name: str) -> datetime | None:
 
 
 def compiled(pattern: str) -> re.Pattern[str]:
-    """The pattern as a regular expression. Raises BadInput for braces that mean nothing, or a name that stands twice."""
+    """The pattern as a regular expression. Raises BadInput for unknown names in braces, or a repeated name."""
     text = "".join(PARTS.get(part, re.escape(part)) for part in re.split(r"(\{\w*\}|\*)", pattern))
     unknown = [part for part in re.findall(r"\{\w*\}", pattern) if part not in PARTS]
     twice = [part for part in PARTS if part != "*" and pattern.count(part) > 1]
@@ -124,7 +124,7 @@ def compiled(pattern: str) -> re.Pattern[str]:
 
 
 def date_of(text: str) -> datetime:
-    """A date, in UTC where it names no zone. Raises BadInput."""
+    """A date, in UTC if no zone is given. Raises BadInput."""
     zone = re.search(rf"{ZONE}$", text)
     local = re.sub(r"[^\d]", "", text[: zone.start()] if zone else text)
     digits, name = (local, zone.group().replace("Z", "+00:00")) if zone and len(local) in (12, 14) else (re.sub(r"[^\d]", "", text), "+00:00")
@@ -139,6 +139,6 @@ def date_of(text: str) -> datetime:
 
 
 def date_within(recording: Recording) -> datetime | None:
-    """When the first sample was taken, if its clock tells the date."""
+    """Time of the first sample, if the recording's clock gives a date."""
     first = float(recording.time[0]) if len(recording) else 0.0
     return datetime.fromtimestamp(first, UTC) if FIRST.timestamp() < first < LAST.timestamp() else None

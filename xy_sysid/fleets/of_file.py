@@ -1,4 +1,4 @@
-"""One file -> its rows: the task that the fleet's processes work on. It needs nothing but the file, and writes nothing."""
+"""One file -> its rows: the task of the fleet's processes. It needs only the file and writes nothing."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from xy_sysid.fleets.row import FirstSets, Plan, Row, row_of
 from xy_sysid.imports import load
 from xy_sysid.imports.reading import Reading
 
-ROWS = 2  # version of what a row means; raised whenever the same data give other numbers or columns
+ROWS = 2  # version of the meaning of a row; increased whenever the same data give other numbers or columns
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
     """One recording to be analysed.
 
-    path: of it; names: how it is named; reading: which columns of it mean what; effect_files: with effects of the user's own
-    first: by axis, effects that are tried before all others; known: keys under which it is in the table already
+    path: of the recording; names: how it is named; reading: how its columns are read; effect_files: the user's own effects
+    first: by axis, effects that are tried before all others; known: keys with which it is already in the table
     """
 
     path: str
@@ -43,7 +43,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """The result of a task. rows: one for each axis; empty where the table has them already (``unchanged``), with this key."""
+    """The result of a task. rows: one per axis; empty if the table already has them (``unchanged``), with this key."""
 
     path: str
     rows: tuple[Row, ...]
@@ -52,7 +52,7 @@ class Done:
 
 
 def rows_of_file(task: Task) -> Done:
-    """The rows of one recording. What the user can mend (``XySysidError``) is a row with its problem; anything else is raised."""
+    """The rows of one recording. An error that the user can correct (``XySysidError``) becomes a row with its problem; others are raised."""
     path, follow = Path(task.path), tuple(task.names.follow)
     try:
         content = digest(path)
@@ -87,9 +87,9 @@ def rows_of_file(task: Task) -> Done:
 
 
 def lost(task: Task, problem: str) -> Done:
-    """The row of a recording whose process gave no answer. It has its key, so that the same recording is not tried again by the same version."""
+    """The row of a recording whose process gave no answer. Its key prevents a retry by the same version."""
     row, path = failed(task.path, "worker", problem), Path(task.path)
-    with suppress(OSError, BadRecording, BadInput):  # then it has no key
+    with suppress(OSError, BadRecording, BadInput):  # without a key
         name = name_of(path, task.names)
         row |= _origin(task, name, digest(path)) | {"date": name.date}
     return Done(task.path, (row,))
@@ -113,7 +113,7 @@ def failed(path: str, stage: str, problem: str) -> Row:
 
 
 def key_of(task: Task, name: Name, content: str) -> str:
-    """What makes a recording the same one: its content, its name, how it is read and analysed, and by which version."""
+    """The identity of a recording: its content, its name, the options of reading and analysis, and the version."""
     own = [digest(Path(file)) for file in task.effect_files]
     parts = [
         content,
@@ -131,7 +131,7 @@ def key_of(task: Task, name: Name, content: str) -> str:
 
 
 def package_version() -> str:
-    """Of xy_sysid."""
+    """Version of xy_sysid."""
     try:
         return version("xy_sysid")
     except PackageNotFoundError:
@@ -139,6 +139,6 @@ def package_version() -> str:
 
 
 def versions(packages: Sequence[str] = ("numpy", "scipy", "numba")) -> str:
-    """Of all software that a row depends on, in one line."""
+    """Versions of all software that affects a row, in one line."""
     others = ", ".join(f"{name} {version(name)}" for name in packages)
     return f"xy_sysid {package_version()}, rows {ROWS}, python {platform.python_version()}, {others}"

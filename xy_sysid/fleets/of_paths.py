@@ -32,19 +32,19 @@ Paths = Iterable[Path | str] | Path | str
 
 @dataclass(frozen=True, slots=True)
 class Analysis:
-    """How the recordings are named, read and analysed: see ``naming.Names`` and ``imports.Reading``; effect_files: with effects of your own."""
+    """How recordings are named, read and analysed: see ``naming.Names`` and ``imports.Reading``; effect_files: your own effects."""
 
     names: Names = field(default_factory=Names)
     reading: Reading = field(default_factory=Reading)
     effect_files: tuple[str, ...] = ()
 
     def task(self, path: Path) -> Task:
-        """One recording to be analysed, by whatever process: its paths are absolute."""
+        """The task for one recording, for any process: its paths are absolute."""
         own = tuple(str(Path(file).expanduser().absolute()) for file in self.effect_files)
         return Task(path=str(path.absolute()), names=self.names, reading=self.reading, effect_files=own)
 
     def check(self) -> None:
-        """Raises BadInput, before any work is done, for names of effects or a pattern that mean nothing."""
+        """Raises BadInput for unknown names of effects or an invalid pattern, before any work."""
         known = library(self.effect_files)
         for name in self.names.follow:
             if known[name].category == "base":
@@ -62,11 +62,11 @@ def fleet(
     follow: Iterable[str] = (),
     workers: int = 0,
 ) -> pyarrow.Table:
-    """Fit and diagnose every recording, and give the table of all results: one row for each axis of each recording.
+    """Fit and diagnose every recording; returns the table of all results: one row for each axis of each recording.
 
-    paths:   recordings, folders or patterns; table: a folder. Recordings that it contains are skipped. Without a folder nothing is kept
-    client:  of a dask cluster; without one, processes of this machine: ``workers``, or one for each core
-    pattern: of the end of a path, with machine, axis and date: "{machine}/{date}*.csv"
+    paths:   recordings, folders or patterns; table: a folder. Recordings in it are skipped. Without a folder nothing is saved
+    client:  of a dask cluster; by default processes on this machine: ``workers``, or one per core
+    pattern: for the end of a path, with machine, axis and date: "{machine}/{date}*.csv"
     follow:  effects whose parameters are estimated in every recording
     Raises BadInput or BadRecording if the call cannot be carried out; an unreadable recording becomes a row with its problem.
     """
@@ -78,7 +78,7 @@ def fleet(
 
 
 def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell: Callable[[Progress], None] = lambda _: None) -> Progress:
-    """Bring the table up to date; ``tell`` hears of every recording. What is done is in the table, however the run ends."""
+    """Update the table; ``tell`` is called after every recording. Finished rows are in the table even if the run is interrupted."""
     arrow()
     dask()
     how.check()
@@ -108,7 +108,7 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
 
 
 def _in_order(client: Client, references: References) -> Iterator[tuple[Done, float]]:
-    """What came of each task, and the s that it took: the first recordings of all machines, and then the others."""
+    """(result, duration in s) of each task: first the first recordings of all machines, then the others."""
     while tasks := references.next():
         for done, seconds in results(client, tasks):
             references.hear(done)
@@ -117,7 +117,7 @@ def _in_order(client: Client, references: References) -> Iterator[tuple[Done, fl
 
 
 def one(path: Path, how: Analysis) -> pyarrow.Table:
-    """The rows of one recording, worked out in this process."""
+    """The rows of one recording, computed in this process."""
     arrow()
     how.check()
     return as_table(rows_of_file(how.task(path)).rows, library(how.effect_files))

@@ -1,4 +1,4 @@
-"""One long recording -> rows of its parts, one after another: a recording of a day as a trend, with no more than one part in memory."""
+"""One long recording -> rows of its consecutive parts: the trend within a day, with only one part in memory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 
 
 def seconds(text: str) -> float:
-    """A time like 10min, 90s or 1h. Raises BadInput."""
+    """A duration in s from text like 10min, 90s or 1h. Raises BadInput."""
     found = re.fullmatch(r"(\d+(?:\.\d*)?)\s*(s|min|h|d|)", text.strip())
     if found is None or float(found.group(1)) * UNITS[found.group(2)] < SHORTEST:
         raise BadInput("--every", repr(text), f"a time of {SHORTEST:g} s or more", "Write for example 10min, 90s or 1h.")
@@ -30,8 +30,8 @@ def seconds(text: str) -> float:
 def rows_of_parts(path: Path, every: float, how: Analysis, tell: Callable[[int], None] = lambda _: None) -> list[Row]:
     """The rows of each part of a recording.
 
-    every: s of a part; tell: hears how many parts are done. A part's date is when it began; where no clock tells the date, 1970 and the time since
-    the start. A part in which nothing is has no row. Raises BadRecording or BadInput for a recording that cannot be read.
+    every: s of a part; tell: called with the number of finished parts. The date of a part is its start; without a clock, 1970 plus the time since
+    the start. A part without samples has no row. Raises BadRecording or BadInput for a recording that cannot be read.
     """
     how.check()
     name, known = name_of(path, how.names), library(how.effect_files)

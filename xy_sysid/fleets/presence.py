@@ -1,8 +1,8 @@
-"""Is an effect named more often, or less, than before? The same detection as of a change, for yes and no.
+"""Is an effect named more or less often than before? The detection of ``change``, for yes and no.
 
-An axis that does not change has its effect named with one probability in every recording; a change takes it to another. Both come from a
-symmetric beta distribution, so that the likelihood ratio of each change has a closed form. The distribution's parameter says how seldom an
-unchanged axis is told now this and now that. It is not known: a few are weighed by how well they explain all axes of the table.
+In an axis that does not change, an effect is named with a constant probability. A change gives another probability. Both come from a
+symmetric beta distribution, so that the likelihood ratio of each change has a closed form. The distribution's parameter says how rarely the
+answer alternates on an unchanged axis. It is not known: a few values are weighted by how well they explain all axes of the table.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from scipy.special import betaln, logsumexp
 from xy_sysid.samples.block import FloatArray
 
 Named = NDArray[np.bool_]
-OFTEN = np.array([0.001, 0.01, 0.1, 1.0])  # parameter of the beta distribution: from nearly never this and that, to any probability alike
+OFTEN = np.array([0.001, 0.01, 0.1, 1.0])  # parameter of the beta distribution: 0.001 almost never alternates, 1 makes any probability equally likely
 
 
 def learned(every: Iterable[Named]) -> FloatArray:
-    """Log weights of ``OFTEN`` from whether effects were named (n,) on all axes, each with a change or without."""
+    """Log weights of ``OFTEN``, from whether effects were named (n,) on all axes, with or without a change."""
     total = np.zeros(OFTEN.size)
     for named in every:
         if named.size > 1:
@@ -29,7 +29,7 @@ def learned(every: Iterable[Named]) -> FloatArray:
 
 
 def statistic(named: Named, weights: FloatArray) -> FloatArray:
-    """(n,) log of Shiryaev and Roberts' statistic after each recording; named: (n,)."""
+    """(n,) log of the Shiryaev-Roberts statistic after each recording; named: (n,)."""
     found = np.full(named.size, -np.inf)
     for count in range(2, named.size + 1):
         part = named[:count]
@@ -39,7 +39,7 @@ def statistic(named: Named, weights: FloatArray) -> FloatArray:
 
 
 def after(named: Named, weights: FloatArray) -> tuple[int, int, int]:
-    """Number of the last recording before the likeliest change of (n,), and the 95 % interval of that number."""
+    """Index of the last recording before the likeliest change of (n,), and the 95 % interval of that index."""
     log = logsumexp(weights[:, None] + _changed(named), axis=0)
     total = np.cumsum(np.exp(log - logsumexp(log)))
     return int(np.argmax(log)), int(np.searchsorted(total, 0.025)), min(int(np.searchsorted(total, 0.975)), named.size - 2)
@@ -60,6 +60,6 @@ def _log(yes: NDArray[np.int64], count: int) -> FloatArray:
 
 
 def _of_each(yes: NDArray[np.int64], count: NDArray[np.int64]) -> FloatArray:
-    """(parameters, k) log probability of so many yes among so many recordings, in the order in which they came."""
+    """(parameters, k) log probability of ``yes`` positive answers in ``count`` recordings, in their given order."""
     a = OFTEN[:, None]
     return np.asarray(betaln(a + yes, a + count - yes) - betaln(a, a))

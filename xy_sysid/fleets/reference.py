@@ -1,7 +1,7 @@
-"""Which effects are tried first in a recording: those that were found in the first recording of the same axis.
+"""Which effects are tried first in a recording: those found in the first recording of the same axis.
 
-The first recording, by date, is searched without knowing anything. So what is tried first depends on the recordings alone, and not on the order in
-which they are analysed, nor on the number of processes. Recordings whose path does not tell the date are all searched without knowing anything.
+The first recording, by date, is searched without prior knowledge. Therefore the order of the search depends only on the recordings, not on the
+order of the analysis or the number of processes. Recordings without a date in their path are all searched without prior knowledge.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from xy_sysid.fleets.naming import Name, name_of
 from xy_sysid.fleets.of_file import Done, Task
 from xy_sysid.fleets.row import FirstSets, Row
 
-COLUMNS = ("machine", "axis", "date", "source", "key", "verdict", "effects")  # that this file reads of a table
-Place = tuple[datetime, str]  # date and file name, in whose order recordings stand
+COLUMNS = ("machine", "axis", "date", "source", "key", "verdict", "effects")  # columns of a table that this file reads
+Place = tuple[datetime, str]  # date and file name; recordings are sorted by these
 
 
 @dataclass
 class _Machine:
     """The recordings of one machine, or of one axis of it where paths tell the axis.
 
-    given: to be analysed, in their order; earlier: rows of the table that are not among these; found: what is tried first, None until it is known
+    given: tasks in order; earlier: rows of the table that are not among these; found: effects to try first, None until known
     """
 
     given: list[tuple[Place, Task]]
@@ -33,23 +33,23 @@ class _Machine:
     found: FirstSets | None = None
 
     def next(self) -> Task | None:
-        """The recording that has to be analysed to know what is tried first; None where that is known, or no recording is left."""
+        """The recording that must be analysed to find the effects to try first; None if they are known, or no recording is left."""
         while self.found is None and self.earlier and (not self.given or min(self.earlier) < self.given[0][0]):
             self.hear(self.earlier.pop(min(self.earlier)))
         return self.given.pop(0)[1] if self.found is None and self.given else None
 
     def hear(self, rows: Iterable[Row]) -> None:
-        """What an analysis found; one without an answer tells nothing."""
+        """Read the result of an analysis; one without an answer gives no information."""
         answered = [row for row in rows if row.get("verdict") not in (None, "not_enough_data")]
         if answered:
             self.found = tuple(sorted((row["axis"], tuple(row["effects"].split(", "))) for row in answered if row["effects"]))
 
 
 class References:
-    """Tasks in the order in which they can be done: first ``next`` until it is empty, with ``hear`` for each of them; then ``rest``."""
+    """Tasks in a possible order: first ``next`` until it is empty, with ``hear`` for each of them; then ``rest``."""
 
     def __init__(self, tasks: Sequence[Task], table: Iterable[Row]) -> None:
-        """table: rows with ``COLUMNS`` of recordings that were analysed before."""
+        """table: rows with ``COLUMNS`` of recordings analysed earlier."""
         self._machines: dict[tuple[str, str], _Machine] = {}
         self._undated: list[Task] = []
         self._asked: dict[str, _Machine] = {}
@@ -72,7 +72,7 @@ class References:
         given = {key: {place for place, _ in machine.given} for key, machine in self._machines.items()}
         for row in table:
             self._by_key.setdefault(row["key"], []).append(row)
-            # a recording in a folder may have said another machine
+            # a recording in a folder may have named another machine
             machine = self._folders.get(str(Path(str(row["source"])).parent)) or str(row["machine"])
             for key in {(machine, ""), (machine, str(row["axis"]))} & given.keys() if row["date"] is not None else ():
                 place = row["date"], Path(row["source"]).name
@@ -80,23 +80,23 @@ class References:
                     self._machines[key].earlier.setdefault(place, []).append(row)
 
     def next(self) -> list[Task]:
-        """One recording of each machine of which nothing is known yet."""
+        """One recording of each machine without known effects."""
         asked = [(machine, task) for machine in self._machines.values() if (task := machine.next()) is not None]
         self._asked = {task.path: machine for machine, task in asked}
         return [task for _, task in asked]
 
     def hear(self, done: Done) -> None:
-        """What came of a task of ``next``."""
+        """Read the result of a task of ``next``."""
         self._asked[done.path].hear(self._by_key.get(done.key, []) if done.unchanged else done.rows)
 
     def rest(self) -> list[Task]:
-        """All other recordings, with what is tried first in them."""
+        """All other recordings, with the effects to try first."""
         known = [dataclasses.replace(task, first=machine.found or ()) for machine in self._machines.values() for _, task in machine.given]
         return [*known, *self._undated]
 
 
 def _name(task: Task) -> Name | None:
-    """None where the path fits no pattern, which the row of the recording will say."""
+    """The name; None if the path does not match the pattern (the recording's row reports this)."""
     try:
         return name_of(Path(task.path), task.names)
     except BadInput:

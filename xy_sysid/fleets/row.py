@@ -30,16 +30,16 @@ from xy_sysid.units import derivative_of
 
 Row = dict[str, Any]
 FAULT = "This is a fault of xy_sysid; please report it."
-FirstSets = tuple[tuple[str, tuple[str, ...]], ...]  # axes, and the effects that are tried first in each
+FirstSets = tuple[tuple[str, tuple[str, ...]], ...]  # axes, and the effects to try first in each
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
     """How an axis is analysed.
 
-    follow:  effects whose parameters are estimated in every recording, named or not, together with those that are named
-    first:   by axis, effects that are tried before all others, as an earlier recording has them
-    library: the effects that are known; clock: processor time, s
+    follow:  effects whose parameters are estimated in every recording, named or not, together with the named ones
+    first:   by axis, effects that are tried before all others, from an earlier recording
+    library: the known effects; clock: processor time, s
     """
 
     follow: tuple[str, ...] = ()
@@ -49,10 +49,10 @@ class Plan:
 
 
 def row_of(recording: Recording, axis: str, plan: Plan) -> Row:
-    """The results of fit and diagnosis, by column name; ``problem`` says why one is missing.
+    """The results of fit and diagnosis by column name; ``problem`` gives the reason for a missing one.
 
-    An unforeseen error is also reported as a problem, so that the other axes of a file keep their rows. The search ends after a counted amount of
-    work, so that the same samples give the same numbers on a busy machine. Columns that have no value are left out.
+    An unforeseen error is also reported as a problem, so that the other axes of a file keep their rows. The search is limited by a count of
+    work, not by time, so that the same samples give the same numbers on a busy machine. Columns without a value are left out.
 
     Raises BadInput for an axis that the recording does not have.
     """
@@ -82,13 +82,13 @@ def _linear(recording: Recording, run: Run, plan: Plan) -> Row:
 
 
 def _fitted(response: FrequencyResponse) -> tuple[Fit, Validation]:
-    """A transfer function of the fewest orders that noise explains; others are tried only where it does not, as in the live nodes."""
+    """A transfer function of the lowest order that explains the data up to noise; higher orders only if needed, as in the live nodes."""
     settings = IdentifierSettings()
-    if derivative_of(response.output_unit) == 2:  # which of three families it is has to be found out, too
+    if derivative_of(response.output_unit) == 2:  # which of the three families applies must be found, too
         return fit_response(response, settings)
     judged(response)
     try:
-        with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
+        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts reject
             choice = choose(response, structure_from(settings), thorough=False)
             return choice.fit, validate(choice.fit, response, choice=choice)
     except (np.linalg.LinAlgError, ZeroDivisionError):
@@ -147,7 +147,7 @@ def _diagnosis(recording: Recording, run: Run, plan: Plan) -> Row:
 
 
 def _followed(runs: tuple[Run, ...], plan: Plan, found: Answer) -> Row:
-    """The parameters of a fit with the effects that are named and those that are followed; nothing new where all of these are named."""
+    """Parameters of a fit with the named and the followed effects; empty if all of these are named."""
     more = tuple(name for name in plan.follow if name not in found.effects)
     return _of_rung(refined(runs, (*found.effects, *more), plan.library, Effort(0)).rungs[-1]) if more else {}
 

@@ -1,6 +1,6 @@
 """The fleet's table: a folder with one Parquet file for each machine, every column with its unit and meaning in the file.
 
-A file is written completely or not at all. Rows of one machine are sorted by axis, date and source, so that the same rows make the same file.
+A file is written completely or not at all. Rows of one machine are sorted by axis, date and source, so that equal rows give an equal file.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ENDING = ".parquet"
 ORDER = ["machine", "axis", "date", "source"]
-KNOWS = ("source", "file_sha256", "date", "axis")  # what makes a recording the same one
+KNOWS = ("source", "file_sha256", "date", "axis")  # columns that identify a recording
 NAMED = re.compile(r"[^\w.-]+")
 
 
@@ -56,7 +56,7 @@ def _told(item: Column) -> dict[str, str]:
 
 
 def as_table(rows: Iterable[Row], library: Library = STANDARD) -> pyarrow.Table:
-    """The rows in the table's order; what the library does not know, as parameters of another run's own effects, stands in the last columns."""
+    """The rows in the table's order; columns unknown to the library, for example of another run's own effects, come last."""
     pa, known = arrow(), schema(library)
     ordered = sorted(rows, key=_place)
     others = dict.fromkeys(name for row in ordered for name in row if name not in known.names)
@@ -70,13 +70,13 @@ def _place(row: Row) -> tuple[str, str, bool, datetime | None, str]:
 
 
 def write(table: pyarrow.Table, path: Path) -> None:
-    """One Parquet file, whole or not at all. Raises BadRecording."""
+    """Write one Parquet file, completely or not at all. Raises BadRecording."""
     with whole(path) as part:
         arrow().parquet.write_table(table, part, compression="zstd")
 
 
 def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
-    """The table, sorted by machine, axis, date and source. names: of the columns that are wanted; None is all.
+    """The table, sorted by machine, axis, date and source. names: of the columns to read; None is all.
 
     Raises BadRecording if it is not a table of a fleet.
     """
@@ -96,7 +96,7 @@ def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
 
 
 def _files(folder: Path) -> list[Path]:
-    """The Parquet files of a table. Raises BadRecording where it cannot be listed, or one is no file."""
+    """The Parquet files of a table. Raises BadRecording if it cannot be listed, or an entry is not a file."""
     try:
         files = [folder] if folder.is_file() else sorted(folder.glob(f"*{ENDING}"))
     except OSError as error:
@@ -107,7 +107,7 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _of_file(file: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
-    """A machine's file; names: of the columns that are wanted, as far as it has them, None is all. Raises BadRecording."""
+    """A machine's file; names: of the columns to read if present, None is all. Raises BadRecording."""
     pa = arrow()
     try:
         return pa.parquet.read_table(file, columns=None if names is None else list(names), partitioning=None)
@@ -121,10 +121,10 @@ def _first_line(error: Exception) -> str:
 
 
 def merged(folder: Path, rows: Iterable[Row], library: Library = STANDARD) -> None:
-    """Put rows into the table.
+    """Merge rows into the table.
 
-    A recording replaces what is there of the same source, whatever the machine was called then, and what is there of the same content and name under
-    another source. What the new rows do not know stays as it is, with its columns.
+    A recording replaces rows of the same source, whatever their machine name was, and rows of the same content and name under another
+    source. Values that the new rows do not contain are kept, with their columns.
     """
     new: dict[str, list[Row]] = {}
     for row in rows:
@@ -145,7 +145,7 @@ def merged(folder: Path, rows: Iterable[Row], library: Library = STANDARD) -> No
 
 
 def _stay(path: Path, sources: Collection[str], own: Sequence[Row]) -> list[bool]:
-    """For each row of a machine's file whether none of its new rows, nor of the sources of all new rows, takes its place."""
+    """For each row of a machine's file, True if no new row of it, nor of the sources of all new rows, replaces it."""
     there = _of_file(path, KNOWS)
     if set(KNOWS) - {*there.column_names}:
         raise BadRecording(path, f"not all of the columns {', '.join(KNOWS)}", "Remove it, or choose another folder for the table.")
@@ -155,7 +155,7 @@ def _stay(path: Path, sources: Collection[str], own: Sequence[Row]) -> list[bool
 
 
 def _together(old: pyarrow.Table, new: pyarrow.Table) -> pyarrow.Table:
-    """Rows of two tables in the table's order: columns of the newer one, then those that only the older one has, as far as anything is in them."""
+    """Rows of two tables in the table's order: columns of the newer one, then those that only the older one has, if not empty."""
     pa = arrow()
     others = [field for field in old.schema if field.name not in new.schema.names and old[field.name].null_count < len(old)]
     whole = pa.schema([*new.schema, *others])
@@ -165,34 +165,34 @@ def _together(old: pyarrow.Table, new: pyarrow.Table) -> pyarrow.Table:
 
 
 def _with(table: pyarrow.Table, whole: pyarrow.Schema) -> pyarrow.Table:
-    """The table with these columns; what it has not is empty."""
+    """The table with these columns; missing ones are empty."""
     pa = arrow()
     arrays = [table[one.name].cast(one.type) if one.name in table.column_names else pa.nulls(len(table), one.type) for one in whole]
     return pa.Table.from_arrays(arrays, schema=whole)
 
 
 def _each_once(rows: Sequence[Row]) -> list[Row]:
-    """Of rows of the same axis of the same recording, be it in two places, the last."""
+    """The last of all rows of the same axis of the same recording, which may be stored in two places."""
     return list({(row["key"] or row["source"], row["axis"]): row for row in rows}.values())
 
 
 def file_name(machine: str) -> str:
-    """Of a machine's file: its name, and where that is no file name, a hash that keeps it apart from others."""
+    """File name for a machine: its name, or a unique hash if that is not a valid file name."""
     plain = NAMED.sub("_", machine).strip("._") or "machine"
     return f"{plain}{ENDING}" if plain == machine else f"{plain}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}{ENDING}"
 
 
 def rows_so_far(folder: Path, names: Sequence[str]) -> list[Row]:
-    """The rows of a table with these columns; none where there is no table yet."""
+    """The rows of a table with these columns; empty if there is no table yet."""
     there = folder.is_dir() and any(folder.glob(f"*{ENDING}"))
     return read(folder, names).to_pylist() if there else []
 
 
 class Known:
-    """The keys of recordings that are in a table, by their paths."""
+    """The keys of recordings in a table, by path."""
 
     def __init__(self, rows: Iterable[Row], given: Collection[str]) -> None:
-        """given: paths that are asked for. A recording of another path may have moved: then the last parts of its path are the same."""
+        """given: requested paths. A recording with another path may have been moved: then the last parts of its path are equal."""
         found: dict[str | tuple[str, ...], set[str]] = {}
         for row in rows:
             source = str(row["source"])
@@ -201,7 +201,7 @@ class Known:
         self._keys = {place: frozenset(keys) - {""} for place, keys in found.items()}
 
     def of(self, path: Path) -> frozenset[str]:
-        """The keys that a recording may have: few, however many have its name."""
+        """The possible keys of a recording: few, even if many recordings have its name."""
         return next((self._keys[place] for place in (str(path), *_ends(path)) if place in self._keys), frozenset())
 
 

@@ -24,16 +24,16 @@ from xy_sysid.jit import on_all_cores
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
-NAMED = 20  # that a refusal lists, at most
-AXIS_MONTHS = 1000.0  # in which an axis that does not change raises one false alarm, at most
+NAMED = 20  # maximum names in an error message
+AXIS_MONTHS = 1000.0  # one false alarm is allowed per this many months of an unchanged axis
 
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """One parameter of one axis changed.
+    """A change of one parameter of one axis.
 
-    column, unit: of the table; before, after: its value, and the 95 % interval ``low`` to ``high`` of the value after; of an effect that is
-        named or no longer named the part of the recordings that name it
+    column, unit: of the table; before, after: its value; ``low`` to ``high``: 95 % interval of the value after; for an effect that is
+        named or no longer named, the fraction of recordings that name it
     part:  after over before, minus 1; sigmas: size over its standard error; NaN for an effect
     since: date of the first recording with it; earliest, latest: 95 % interval of that; declared: date from which it was certain enough
     one_in: axis-months in which chance alone gives such evidence once
@@ -59,7 +59,7 @@ class Moved:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What changed on one axis at one time. moved: the most certain first; cause: None where the table of causes has none."""
+    """The changes of one axis at one time. moved: most certain first; cause: None if the table of causes has none."""
 
     machine: str
     axis: str
@@ -68,7 +68,7 @@ class Event:
 
     @property
     def since(self) -> datetime:
-        """Of the most certain change."""
+        """Date of the most certain change."""
         return self.moved[0].since
 
 
@@ -76,7 +76,7 @@ class Event:
 class Trend:
     """One parameter of one axis over time.
 
-    spread: standard deviation between recordings of an unchanged axis, part of the value; low, high: (n,) 95 % intervals with it
+    spread: standard deviation between recordings of an unchanged axis, fraction of the value; low, high: (n,) 95 % intervals including it
     next:   95 % interval of the next recording's value, if nothing changes
     moved:  its changes
     """
@@ -93,8 +93,8 @@ class Trend:
 
 @dataclass(frozen=True, slots=True)
 class Trends:
-    """All of a table. axes: with their dates; trends: of every parameter; events: changes, the latest last; pooled: the spread was learned from
-    several axes together; unread: recordings of which nothing is known"""
+    """All trends of a table. axes: with their dates; trends: of every parameter; events: changes, latest last; pooled: True if the spread was learned
+    from several axes; unread: recordings that could not be read"""
 
     axes: tuple[Axis, ...]
     trends: tuple[Trend, ...]
@@ -111,7 +111,7 @@ class Trends:
         raise BadInput("trend", f"{machine} {axis} {column}", f"one of {known}", "Choose one of these.")
 
     def of_machines(self, wanted: Collection[str]) -> Trends:
-        """Only of these machines, with all that was learned from the others."""
+        """The trends of only these machines, with the spread that was learned from all."""
         return replace(
             self,
             axes=tuple(one for one in self.axes if one.machine in wanted),
@@ -138,7 +138,7 @@ def trend(
     table:  the folder that ``fleet`` made; machines: only their trends; own_causes: a YAML file that adds to the table of causes
     axis_months: months of an unchanged axis in which one false alarm is allowed; tell: called with the progress, 0..1
     The spread between recordings is learned for each parameter from all axes of the table together, and is in every interval.
-    Raises BadRecording for what is no table, BadInput for a machine that is not in it, or where no axis has four recordings with a date and an
+    Raises BadRecording if it is not a table, BadInput for a machine that is not in it, or if no axis has four recordings with a date and an
     answer.
     """
     known, found = causes(own_causes), read(Path(table))
@@ -153,9 +153,9 @@ def of_rows(
     tell: Callable[[float], None] = lambda _: None,
     machines: Iterable[str] = (),
 ) -> Trends:
-    """The same of rows that are in no table.
+    """The changes in rows that are in no table; otherwise as ``trend``.
 
-    names: of columns, where there are parameters of effects of a user's own; known: causes, where they are not those of the package
+    names: of columns, if there are parameters of the user's own effects; known: causes, if not those of the package
     """
     if not axis_months > 0.0:
         raise BadInput("axis_months", axis_months, "above 0", "Usual is 1000.")
@@ -175,7 +175,7 @@ def of_rows(
 
 
 def of_axes(every: Sequence[Axis], known: Causes, axis_months: float = AXIS_MONTHS, tell: Callable[[float], None] = lambda _: None) -> Trends:
-    """The same of axes whose histories are known."""
+    """The changes of axes whose histories are known; otherwise as ``trend``."""
     every_evidence: dict[tuple[int, str], tuple[Evidence, Series]] = {}
     count = sum(len(one.histories) for one in every)
     for number, one in enumerate(every):
@@ -209,7 +209,7 @@ def _newest(history: History) -> Series:
 
 
 def threshold(axis: Axis, axis_months: float) -> float:
-    """Log of the statistic from which a change is declared: each test passes it once in so many recordings, or more seldom."""
+    """Log statistic from which a change is declared: each test exceeds it by chance at most once in the allowed number of recordings."""
     a_month = max(len(axis.dates) - 1, 1) / max(axis.months, 1e-9)
     return math.log(axis_months * a_month * max(axis.tests, 1))
 
@@ -242,7 +242,7 @@ def _trend(axis: Axis, history: History, weights: FloatArray, known: tuple[Evide
 
 
 def mean_before(series: Series, found: Sequence[Change], number: int) -> float:
-    """Level before a change: the mean of what lies between the change before it and itself."""
+    """Level before a change: the mean of the values since the previous change."""
     first = 0
     if number:
         earlier = found[number - 1]
@@ -274,7 +274,7 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
 
 
 def _named(axis: Axis, often: FloatArray, axis_months: float) -> list[Moved]:
-    """Effects that are named more often, or less, than before."""
+    """Effects that are named more or less often than before."""
     level, found = threshold(axis, axis_months), []
     for effect, named in axis.named.items():
         log = presence.statistic(named, often)
@@ -306,7 +306,7 @@ def _named(axis: Axis, often: FloatArray, axis_months: float) -> list[Moved]:
 
 
 def _events(axis: Axis, moved: Sequence[Moved], known: Causes) -> list[Event]:
-    """Changes whose dates may be the same are one event."""
+    """Group changes whose dates may be equal into one event."""
     groups: list[list[Moved]] = []
     for one in sorted(moved, key=lambda item: (item.earliest, item.latest)):
         if groups and one.earliest <= max(item.latest for item in groups[-1]):

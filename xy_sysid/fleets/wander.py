@@ -1,6 +1,6 @@
 """The wander of a parameter without a change: a grid of wanders, and the likelihood of a series for each.
 
-A wander is a Gaussian process: its standard deviation is a part of the level, and some of its variance is slow. A series that is divided by the
+A wander is a Gaussian process. Its standard deviation is a fraction of the level, and a part of its variance is slow. A series divided by the
 Cholesky factor of its covariance is white; then a change is a regression (the equations are in ``change``).
 """
 
@@ -17,17 +17,17 @@ from scipy.special import logsumexp
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 
-SPREADS = np.geomspace(3e-4, 0.3, 24)  # tau, part of the level: each a third above the one before
-SLOW = ((0.0, 1.0), *((part, length) for part in (0.3, 0.7, 1.0) for length in (3.0, 12.0)))  # part of tau^2, and length, of what is slow
-USUAL = 0.03  # spread between recordings of an unchanged axis: scatter of the friction torque of ball screws, the most lively parameter
+SPREADS = np.geomspace(3e-4, 0.3, 24)  # tau, fraction of the level: each a third larger than the one before
+SLOW = ((0.0, 1.0), *((part, length) for part in (0.3, 0.7, 1.0) for length in (3.0, 12.0)))  # slow part of tau^2, and its correlation length
+USUAL = 0.03  # spread between recordings of an unchanged axis: scatter of the friction torque of ball screws, the least stable parameter
 SIZES = (0.01, 0.04, 0.16, 0.64)  # standard deviation of a change, part of the level
-CERTAIN = 600.0  # log of a likelihood ratio beyond which it is all the same
-EXACT = 1e-5  # part of the level: no estimate is more exact
+CERTAIN = 600.0  # log likelihood ratio above which differences do not matter
+EXACT = 1e-5  # fraction of the level: no estimate is taken to be more exact
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One parameter of one axis over time, as parts of its level.
+    """One parameter of one axis over time, as fractions of its level.
 
     time: (n,) usual distances between recordings, increasing; value, sigma: (n,) estimate and standard error
     """
@@ -37,11 +37,11 @@ class Series:
     sigma: FloatArray
 
     def after(self, place: int) -> Series:
-        """From that recording on."""
+        """The series from that recording on."""
         return Series(self.time[place:], self.value[place:], self.sigma[place:])
 
     def until(self, place: int) -> Series:
-        """Before that recording."""
+        """The series before that recording."""
         return Series(self.time[:place], self.value[:place], self.sigma[:place])
 
 
@@ -56,13 +56,13 @@ class Wander:
 
 @functools.cache
 def grid() -> tuple[Wander, ...]:
-    """Every wander that is weighed."""
+    """Every wander of the grid."""
     return tuple(Wander(float(spread), part, length) for part, length in SLOW for spread in SPREADS)
 
 
 @functools.cache
 def usual() -> FloatArray:
-    """(g,) log weights of the grid when nothing else is known: half a normal distribution of the spread, and all else alike."""
+    """(g,) log weights of the grid without other knowledge: a half-normal distribution of the spread, uniform in the rest."""
     log = np.array([-0.5 * (one.spread / USUAL) ** 2 for one in grid()])
     return np.asarray(log - logsumexp(log))
 
@@ -80,14 +80,14 @@ class Whitened:
     shape: FloatArray
 
     def ratios(self, begun: NDArray[np.int64]) -> FloatArray:
-        """(shapes, n) likelihood ratio of each shape after each recording, mean over sizes, 0 before it has begun.
+        """(shapes, n) likelihood ratio of each shape after each recording, averaged over sizes; 0 before its start.
 
         begun: (shapes,) first recording in which a shape is not 0
         """
         return _ratios(self.one, self.value, np.ascontiguousarray(self.shape.T), begun, np.array(SIZES))
 
     def sizes(self) -> tuple[FloatArray, FloatArray]:
-        """(shapes,) information on the size of each shape, and its score: their ratio is the likeliest size."""
+        """(shapes,) information on the size of each shape, and its score: their ratio is the maximum-likelihood size."""
         across, ones = self.one @ self.shape, float(self.one @ self.one)
         information = np.maximum(np.sum(self.shape**2, axis=0) - across**2 / ones, 0.0)
         return information, self.value @ self.shape - across * float(self.one @ self.value) / ones
@@ -123,9 +123,9 @@ def whitened(series: Series, wander: Wander, shapes: FloatArray) -> Whitened:
 
 
 def divided(series: FloatArray, covariance: FloatArray, shapes: FloatArray) -> Whitened:
-    """A series (n,) and shapes (n, k) for one covariance (n, n).
+    """A series (n,) and shapes (n, k), whitened with one covariance (n, n).
 
-    The Cholesky factor of the first recordings is the corner of that of all, so that running sums give the answers after each.
+    The Cholesky factor of the first recordings is the leading block of the full one, so that running sums give the results after each.
     """
     factor = np.linalg.cholesky(covariance)
     columns = np.column_stack((np.ones_like(series), series - series[0], shapes))

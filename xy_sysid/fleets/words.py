@@ -11,11 +11,11 @@ from xy_sysid.fleets.history import BEGIN, DAY, FEWEST, MONTH, Axis
 from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
 from xy_sysid.units import Units, readable
 
-MOST = 6  # changes of an event that are told one by one
+MOST = 6  # changes of an event that are listed individually
 
 
 def sentence(event: Event, axis: Axis) -> str:
-    """What changed, since when, by how much, how sure, and why."""
+    """The change, its date, its size, its certainty and its cause."""
     first, *others = event.moved
     text = f"{event.machine} {event.axis}: {told(first, axis)}."
     if others:
@@ -30,7 +30,7 @@ def _more(count: int) -> str:
 
 
 def told(one: Moved, axis: Axis) -> str:
-    """One change."""
+    """One change in words."""
     if math.isnan(one.sigmas):
         often = f"in {100 * one.after:.0f} % of the recordings, before in {100 * one.before:.0f} %"
         return f"{one.column} is named {often}, since {day(one.since)}"
@@ -43,7 +43,7 @@ def told(one: Moved, axis: Axis) -> str:
 
 
 def day(date: datetime) -> str:
-    """3 March 2026, with the time of day where there is one; the time since the start where no clock tells the date."""
+    """3 March 2026, with the time of day if known; the time since the start if no clock gives the date."""
     if _has_no_clock(date):
         return f"{(date - BEGIN).total_seconds() / 60.0:.4g} min after the start"
     text = f"{date.day} {date:%B %Y}"
@@ -55,12 +55,12 @@ def _has_no_clock(date: datetime) -> bool:
 
 
 def chance(one: Moved) -> str:
-    """How seldom such evidence comes by chance."""
+    """How rarely such evidence occurs by chance."""
     return f"once in {one.one_in:.1e} axis-months" if one.one_in < 1e9 else "less than once in 1e9 axis-months"
 
 
 def summary(trends: Trends) -> str:
-    """How much was looked at."""
+    """The amount of data analysed, in words."""
     dated = [axis for axis in trends.axes if len(axis.dates) >= FEWEST]
     out = sum(axis.left_out for axis in trends.axes)
     months = sum(axis.months for axis in dated)
@@ -71,7 +71,7 @@ def summary(trends: Trends) -> str:
 
 
 def gaps(trends: Trends) -> list[str]:
-    """What the table cannot tell, one sentence for each reason; none where nothing is missing."""
+    """What the table cannot show, one sentence for each reason; empty if nothing is missing."""
     axes = [(f"{one.machine} {one.axis}", one) for one in trends.axes]
     lost = [(f"{one.machine} with its newest" if one.newest else one.machine, one.recordings) for one in trends.unread]
     silent = [(name, one.silent) for name, one in axes if one.silent]
@@ -91,14 +91,14 @@ def _each(named: Sequence[tuple[str, int]]) -> str:
 
 
 def clocked(dates: Sequence[datetime]) -> tuple[list[datetime] | list[float], str]:
-    """The dates as they are drawn, and what the axis says: min after the start where no clock tells the date."""
+    """The dates to plot, and the axis label: min after the start if no clock gives the date."""
     if dates and _has_no_clock(dates[0]):
         return [(date - BEGIN).total_seconds() / 60.0 for date in dates], "min after the start"
     return list(dates), ""
 
 
 def widest(trends: Trends) -> list[tuple[str, float, float]]:
-    """By parameter: median spread between recordings and median half width of a recording's own interval, parts of the value."""
+    """For each parameter: median spread between recordings and median half width of a recording's own interval, fractions of the value."""
     found: dict[str, list[Trend]] = {}
     for one in trends.trends:
         found.setdefault(one.history.column, []).append(one)

@@ -1,20 +1,20 @@
-"""Recordings in and out, whatever the file.
+"""Recordings from and to files of any format.
 
-reading:              how a file is to be read: which columns mean what
+reading:              options for reading a file: the meaning of columns
 bag, paired_streams:  two streams of a bag, paired by sample number
-registry:             which reader takes which file, a row for each kind
+registry:             which reader reads which file, one row per format
 csv, arrays, twincat, codesys, mitsubishi, json_log: files as sheets of columns
-libraries, guarded, leaves: files that a library of others reads, in a process of its own, as sheets of columns
-several_files, own_times: columns from several files, and columns with times of their own, as one table
-sheet, names, roles:  which column is what, by its name or as the user says
+libraries, guarded, leaves: formats read by other packages, in a separate process, as sheets of columns
+several_files, own_times: columns from several files, and columns with their own times, as one table
+sheet, names, roles:  the role of each column, from its name or from the user
 sheet_table, table, even: columns in SI, numbered by their time, which may be uneven
 clock:                time against the sample counter
 foreign_units, given: units of foreign files
 motion:               velocity and acceleration become position
-plausible:            what looks wrong, in words
-several, listing:     several recordings as one; what is in a file
+plausible:            sentences about implausible data
+several, listing:     several recordings as one; the content of a file
 in_parts:             a long recording as parts, one after another
-limits:               how much a file may become
+limits:               maximum size of a file in memory
 """
 
 from __future__ import annotations

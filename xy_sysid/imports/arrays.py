@@ -39,7 +39,7 @@ TIME_UNITS = ("t_unit", "TimeUnit")
 RATES = ("fs", "samplingrate", "samplerate", "samplingfrequency", "samplefrequency", "fsample", "rate")  # as ``_plain`` writes them
 PERIODS = ("ts", "dt", "samplingperiod", "sampleperiod", "samplingtime", "sampletime", "tsample", "samplinginterval", "sampleinterval")
 QUOTED = re.compile(r'"([^"]*)"')
-DULL = re.compile(r"Model Root|(In|Out)\d+", re.IGNORECASE)  # parts of a block's path that tell nothing
+DULL = re.compile(r"Model Root|(In|Out)\d+", re.IGNORECASE)  # parts of a block's path that carry no information
 VALUES, LABELS, UNITS = ("Data", "data", "values", "Values"), ("Name", "name", "label", "Label", "Path"), ("Unit", "unit", "Units", "units")
 
 
@@ -60,7 +60,7 @@ def read_npz(path: Path) -> Arrays:
 
 
 def _member(path: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
-    """One array; its header is read first, since memory is taken for what that says."""
+    """One array; its header is read first, because it sets the allocated memory."""
     form = np.lib.format
     with archive.open(member) as file:
         version = form.read_magic(file)
@@ -140,7 +140,7 @@ def _sides(
     names = np.atleast_1d(arrays["axes"]).astype(str).tolist() if "axes" in arrays else []
     every = tuple(name.strip() for name in names) if len(names) == inputs.shape[1] else axis_names(inputs.shape[1])
     reference = reference if reference is not None and reference.shape == outputs.shape else None
-    places = places_of(every, wanted)  # the units of those that are left out do not matter
+    places = places_of(every, wanted)  # units of omitted axes do not matter
     axes = tuple(every[place] for place in places)
     return inputs[:, places], outputs[:, places], None if reference is None else reference[:, places], axes
 
@@ -181,7 +181,7 @@ def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], re
 
 
 def rate_of(arrays: Arrays) -> float | None:
-    """Hz, from a rate or a period that the file says; None if it says none that can be."""
+    """Hz, from a valid rate or period in the file; None without one."""
     plain = {_plain(name): value for name, value in arrays.items()}
     for names, invert in ((RATES, False), (PERIODS, True)):
         for name in names:
@@ -222,7 +222,7 @@ def sheet_of(path: Path, arrays: Arrays) -> Sheet:
 
 
 def short(columns: list[Column]) -> list[Column]:
-    """Without the names of structs or groups where that leaves no two alike."""
+    """The columns without the names of structs or groups, if the names stay unique."""
     last = [column.name.rpartition(".")[2] for column in columns]
     return [
         replace(one, name=name, full=one.name) if last.count(name) == 1 and name != one.name else one for one, name in zip(columns, last, strict=True)
@@ -269,7 +269,7 @@ def _real(path: Path, name: str, values: NDArray[Any]) -> FloatArray:
 
 
 def _matrix(path: Path, name: str, values: NDArray[Any], rows: int | None) -> FloatArray:
-    """(n, axes): columns, turned if it came as rows."""
+    """(n, axes): columns; transposed if given as rows."""
     values = _real(path, name, values)
     if values.ndim > 2 or values.ndim == 0:
         raise BadRecording(path, f"{name} has {values.ndim} dimensions", "Give samples, or samples x axes.")
@@ -280,7 +280,7 @@ def _matrix(path: Path, name: str, values: NDArray[Any], rows: int | None) -> Fl
 
 
 def content(recording: Recording) -> dict[str, Any]:
-    """What is written to .npz and .mat: enough to get the same recording back."""
+    """The arrays for .npz and .mat: enough to restore the recording."""
     known = {
         "t": recording.time,
         "u": recording.voltage,
@@ -295,7 +295,7 @@ def content(recording: Recording) -> dict[str, Any]:
 
 
 def write_npz(path: Path, recording: Recording) -> None:
-    """Exact, not compressed."""
+    """Write exact, uncompressed numbers."""
     with path.open("wb") as file:
         np.savez(file, allow_pickle=False, **content(recording))
 

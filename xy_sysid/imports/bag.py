@@ -20,9 +20,9 @@ from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.recording import Recording
 
 KINDS: tuple[StreamName, ...] = ("voltage", "position")
-WHOLE = 1 << 40  # samples; blocks as long as they come
-MARGIN = 1.0  # s kept around the part that was asked for, for samples that came late
-COPIES = 4  # times the size of the samples that pairing needs while it works
+WHOLE = 1 << 40  # samples; keeps blocks as they are
+MARGIN = 1.0  # s around the requested part, for late samples
+COPIES = 4  # memory for pairing, as a multiple of the samples' size
 SHARE = 0.6  # of the machine's memory that a recording may take
 
 
@@ -114,12 +114,12 @@ def _collect(
 
 
 def size_of(block: Block) -> int:
-    """Bytes of its samples."""
+    """Bytes of a block's samples."""
     return block.values.nbytes + block.seq.nbytes + block.time.nbytes
 
 
 def check_room(bag: Bag, size: int) -> None:
-    """Raises BadRecording for so many bytes of samples as the memory has no room for."""
+    """Raises BadRecording if the memory has no room for this many bytes of samples."""
     if size > SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / COPIES:
         raise bag.bad(f"more than {size / 1e9:.1f} GB of samples, too long to load at once", "Give a part with --span, or replay it.")
 
@@ -158,7 +158,7 @@ def _axes(
 
 
 def _usual(blocks: Sequence[Block]) -> tuple[str, ...]:
-    """The columns that most samples have: one wrong message, were it the first, does not decide."""
+    """The columns of most samples: a single wrong message does not decide, even if it is the first."""
     counts: dict[tuple[str, ...], int] = {}
     for block in blocks:
         counts[block.axes] = counts.get(block.axes, 0) + len(block)
@@ -166,7 +166,7 @@ def _usual(blocks: Sequence[Block]) -> tuple[str, ...]:
 
 
 def _with_numbers(bag: Bag, blocks: dict[StreamName, list[Block]], axes: tuple[str, ...], notes: list[str]) -> tuple[str, ...]:
-    """The axes without those that have hardly any numbers, as long as others have."""
+    """The axes without those that have hardly any numbers, if others have them."""
     empty: set[str] = set()
     for kind in ("voltage", "position"):
         values = [block.values for block in blocks[kind]]
@@ -181,7 +181,7 @@ def _with_numbers(bag: Bag, blocks: dict[StreamName, list[Block]], axes: tuple[s
 
 
 def _by_stamp(stream: Stream, by: Stream) -> Stream:
-    """Samples with the number of that sample of another stream which is next in time; a number is given once."""
+    """Give each sample the number of the closest sample in time of another stream; each number is used once."""
     order = np.argsort(by.time, kind="stable")
     times, numbers = by.time[order], by.seq[order]
     after = np.clip(np.searchsorted(times, stream.time), 1, len(times) - 1) if len(times) > 1 else np.zeros(len(stream.time), dtype=np.int64)

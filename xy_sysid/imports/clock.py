@@ -7,7 +7,7 @@ import numpy as np
 from xy_sysid.samples.block import FloatArray
 
 OFF = 0.4  # of a period; less is jitter of the stamps
-BEFORE = 8  # samples on either side of a step, over which it must last
+BEFORE = 8  # samples before and after a step, over which it must persist
 SAID = 3  # places named in one sentence
 
 
@@ -34,7 +34,7 @@ def steps(seq: FloatArray, time: FloatArray, rate: float) -> tuple[list[tuple[in
     """(row, size) of lasting steps: of time in s where the counter goes on, of the counter in samples where the time goes on."""
     if len(seq) < 2 * BEFORE or rate <= 0:
         return [], []
-    ahead = (time - time[0]) * rate - (seq - seq[0])  # periods by which time runs ahead of the counter
+    ahead = (time - time[0]) * rate - (seq - seq[0])  # periods by which time is ahead of the counter
     counted, passed = np.diff(seq), np.diff(time) * rate
     rows = np.flatnonzero(np.abs(passed - counted) > OFF) + 1
     jumps: list[tuple[int, float]] = []

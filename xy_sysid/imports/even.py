@@ -1,4 +1,4 @@
-"""Uneven time --> even samples: stamps that jitter are counted, time that is truly uneven is resampled, or refused.
+"""From uneven time to even samples: jittering stamps are counted; truly uneven time is resampled, or refused.
 
 Jitter of the stamps alone leaves them within a period of a straight line, now before it and now after; the samples
 themselves are even and stay as they are. Where the instants wander off the line the samples are uneven: the input, which is
@@ -19,16 +19,16 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import rate_from_time
 
 GAP = 2.5  # periods; over a longer step nothing is interpolated
-BRIDGED = 10.0  # periods; the same where steps jitter so much that hardly LOCAL of them come without a gap
-LOCAL = 50  # samples over which the period is looked at
-STEADY = 0.005  # relative; a period that wanders by less is even enough: frequencies are off by no more
+BRIDGED = 10.0  # periods; used instead of GAP if steps jitter so much that hardly LOCAL of them come without a gap
+LOCAL = 50  # samples over which the period is evaluated
+STEADY = 0.005  # relative; a period that varies less counts as even: frequencies are wrong by no more
 BURST = 0.2  # of a period; more steps than BURSTS shorter than that are stamps that came in bursts
 BURSTS = 0.2
 STRETCH, APART = (
     200,
     50,
 )  # samples over which a period is distinguished from late, lost and jittering stamps; distance of two samples that are compared
-DRIFT = 0.02  # relative; a period that changes by more within a recording is not one
+DRIFT = 0.02  # relative; a period that changes by more within a recording is not constant
 LOST = 0.3  # of the time; where steps jitter, more than that in steps longer than GAP is lost
 Values = tuple[FloatArray, ...]
 
@@ -68,7 +68,7 @@ def even(path: Path, time: FloatArray, held: FloatArray, smooth: Values, notes: 
 
 
 def _wanders(steps: FloatArray) -> bool:
-    """Whether the period itself changes, rather than single stamps jitter about a steady one."""
+    """True if the period itself changes; False if only single stamps jitter around a constant one."""
     near = steps[(steps > 0) & (steps < GAP)]
     if len(near) < 2 * LOCAL:
         return False
@@ -78,13 +78,13 @@ def _wanders(steps: FloatArray) -> bool:
     local = (sums[LOCAL:] - sums[:-LOCAL]) / LOCAL
     line = np.arange(len(sums)) - (len(sums) - 1) / 2
     from_line = sums - sums.mean() - line * (line @ sums) / (line @ line)
-    if float(np.max(np.abs(from_line))) < 1.0:  # never a whole period off: jitter, or nothing to lose
+    if float(np.max(np.abs(from_line))) < 1.0:  # never off by a full period: jitter, or nothing to lose
         return False
     return float(np.max(np.abs(local))) > STEADY
 
 
 def drifts(time: FloatArray) -> bool:
-    """Whether the period itself changes, as that of an overloaded machine does; cycles that are late, lost or made up for leave it what it is."""
+    """True if the period itself changes, as on an overloaded machine; late, lost or compensated cycles do not count."""
     steps = np.diff(time)
     if len(time) < 2 * STRETCH or not float(np.median(steps)) > 0:
         return False
@@ -93,7 +93,7 @@ def drifts(time: FloatArray) -> bool:
 
 
 def _varies(time: FloatArray, count: FloatArray) -> bool:
-    """Whether the period by this count, each the median of many over a stretch, differs from one stretch to another."""
+    """True if the period by this count, a median of many over a stretch, differs between stretches."""
     passed, counted = time[APART:] - time[:-APART], count[APART:] - count[:-APART]
     periods, rows = passed / np.maximum(counted, 1.0), STRETCH - APART
     local = [np.median(periods[begin : begin + rows]) for begin in range(0, len(periods) - rows + 1, STRETCH // 2)]
@@ -156,6 +156,6 @@ def _means(time: FloatArray, held: FloatArray, instants: FloatArray, period: flo
 
 def between(time: FloatArray, values: FloatArray, instants: FloatArray) -> FloatArray:
     """Values (n, ...) at other instants, by a cubic spline."""
-    from scipy.interpolate import CubicSpline  # only what is uneven pays for it
+    from scipy.interpolate import CubicSpline  # imported only for uneven samples
 
     return np.asarray(CubicSpline(time, values, axis=0)(instants))

@@ -1,4 +1,4 @@
-"""Units of foreign files: what a column measures, and its factor to SI. An unknown unit is kept and reported."""
+"""Units of other programs' files: the quantity of a column, and its factor to SI. An unknown unit is kept and reported."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from xy_sysid.samples.block import FloatArray
 
 Quantity = Literal["time", "voltage", "current", "force", "torque", "command", "position", "velocity", "acceleration", "unknown"]
-FULL_SCALE = "FS"  # of a normalised command: 1 is all that the drive gives
+FULL_SCALE = "FS"  # of a normalised command: 1 is the full output of the drive
 COUNTS = "counts"
 DRIVES: tuple[Quantity, ...] = ("voltage", "current", "force", "torque", "command")
 MOTIONS: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
@@ -65,7 +65,7 @@ PER_TIME = re.compile(r"^(?P<of>.+?)/(?P<time>[a-zA-Z]+?)(?P<twice>\^?2|\*\*2|/s
 
 
 def unit_of(text: str) -> Unit:
-    """What a unit means; "unknown" for one that is not in the table, which is carried as it is."""
+    """The meaning of a unit; "unknown" for one that is not in the table, which is kept unchanged."""
     plain = text.strip().replace("µ", "u").replace("μ", "u").replace("²", "^2").replace("⁻", "^-").replace("¹", "1").replace("^-^", "^-")
     plain = INVERSE.sub(lambda found: f"/{found['time']}{'^2' if found['power'] == '2' else ''}", plain)
     key = re.sub(r"\s+|(?<=[A-Za-z])[·*.-](?=[A-Za-z])", "", plain)

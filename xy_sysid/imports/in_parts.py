@@ -22,7 +22,7 @@ from xy_sysid.imports.registry import BAG, format_of
 from xy_sysid.samples.block import Block, FloatArray, StreamName
 from xy_sysid.samples.recording import Recording
 
-SHORTEST = MARGIN  # s of a part
+SHORTEST = MARGIN  # s, least length of a part
 
 
 def in_parts(path: Path, reading: Reading, every: float) -> Iterator[tuple[int, Recording]]:
@@ -45,7 +45,7 @@ def in_parts(path: Path, reading: Reading, every: float) -> Iterator[tuple[int, 
 
 
 def _span(reading: Reading, every: float, number: int) -> Reading:
-    """How a part is read."""
+    """Reading options for a part."""
     start = reading.start + number * every
     return dataclasses.replace(reading, start=start, stop=min(start + every, math.inf if reading.stop is None else reading.stop))
 
@@ -60,12 +60,12 @@ def _of_table(path: Path, reading: Reading, every: float) -> Iterator[tuple[int,
     for number in _numbers(whole.time - first - reading.start, every, 1e-9):
         if 0 <= number <= _last(reading, every):
             span = _span(reading, every, number)
-            with suppress(BadInput):  # too little for a part
+            with suppress(BadInput):  # too few samples for a part
                 yield number, cut(whole, first, span.start, span.stop)
 
 
 def _numbers(elapsed: FloatArray, every: float, margin: float) -> list[int]:
-    """The parts that hold some instants, s, or come within a margin of them."""
+    """The parts that contain some instants, s, or are within a margin of them."""
     return [int(number) for number in np.unique(np.floor(np.concatenate([elapsed - margin, elapsed, elapsed + margin]) / every))]
 
 
@@ -107,9 +107,9 @@ def _of_bag(path: Path, reading: Reading, every: float) -> Iterator[tuple[int, R
             del sizes[number]
             said = len(bag.notes)
             if origin is not None:
-                with suppress(BadInput):  # too little for a part
+                with suppress(BadInput):  # too few samples for a part
                     yield number, together(bag, source, blocks, origin - reading.start, _span(reading, every, number))
-            del bag.notes[said:]  # which are of this part
+            del bag.notes[said:]  # the notes of this part
 
         for kind, start, block, known in _counted(pieces(bag, source, WHOLE, None)):
             if start == len(begins):

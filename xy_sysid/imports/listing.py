@@ -17,13 +17,13 @@ from xy_sysid.imports.registry import BAG
 from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.samples.block import FloatArray
 
-FEW = 8  # levels that are counted
+FEW = 8  # distinct levels that are counted
 LARGE = 300_000_000  # bytes; a larger bag is listed without being read
 
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """One column. looks: what its numbers look like; role: what it is taken for without --map, "" for nothing."""
+    """One column. looks: description of its numbers; role: its role without --map, "" for none."""
 
     name: str
     unit: str
@@ -78,7 +78,7 @@ def listing(path: Path) -> Listing:
 
 
 def _of_response(path: Path, sheet: Sheet) -> Listing:
-    """Of a measured frequency response."""
+    """The listing of a measured frequency response."""
     roles_of = {column.name: role for role in response_file.NAMES if (column := response_file.column_of(sheet, role, Reading())) is not None}
     found = tuple(_listed(column, roles_of.get(column.name, "")) for column in sheet.columns)
     try:
@@ -91,7 +91,7 @@ def _of_response(path: Path, sheet: Sheet) -> Listing:
 
 
 def _taken(sheet: Sheet) -> Mapping[str, str]:
-    """Role of each column as it is taken without --map."""
+    """Role of each column without --map."""
     contract = [(arrays.INPUTS, "input"), (arrays.OUTPUTS, "output"), (arrays.REFERENCES, "reference"), (arrays.TIMES, "time")]
     if sheet.arrays is not None:
         found = {column.name: role for column in sheet.columns for names, role in contract if column.name.partition(":")[0] in names}
@@ -134,7 +134,7 @@ def _looks(column: Column, finite: FloatArray) -> str:
 
 
 def _topics(path: Path) -> tuple[Listed, ...]:
-    """A row for each topic, with the names of its columns or joints."""
+    """One row per topic, with the names of its columns or joints."""
     with Bag(path) as bag:
         names = [topic.name for topic in bag.topics]
         inside: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""What every model of an axis can do, a transfer function as well as one with physical effects."""
+"""The interface of every model of an axis: a transfer function, or a model with physical effects."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from xy_sysid.samples.block import FloatArray
 
 
 class AnyModel(Protocol):
-    """A model of one axis, whatever it is made of."""
+    """A model of one axis, of either kind."""
 
     @property
     def tf(self) -> TransferFunction:
@@ -21,15 +21,15 @@ class AnyModel(Protocol):
 
     @property
     def data(self) -> tuple[str, ...]:
-        """SHA-256 of the samples of each recording that it was fitted to, as far as they are known."""
+        """SHA-256 of the samples of each recording in its fit, if known."""
 
     @property
     def doubt(self) -> str:
-        """What speaks against judging it by its free simulation; empty if nothing does."""
+        """Why free simulation cannot judge it; empty if it can."""
 
     @property
     def label(self) -> str:
-        """A few words for a legend."""
+        """A short text for a legend."""
 
     def velocity(self, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> FloatArray:
         """(n - 1,) simulated mean velocity of each sample, m/s, from rest, for voltage and measured position (n,), V and m."""

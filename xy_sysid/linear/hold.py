@@ -1,4 +1,4 @@
-"""What a zero-order hold and sampling add to a continuous response: its aliases, summed to infinity.
+"""Effect of a zero-order hold and sampling on a continuous response: its aliases, summed to infinity.
 
 A plant G behind a hold, a delay d and a sampler answers, with s_k = j (w + k 2 pi / T),
     H(w) = (1 - exp(-j w T)) / T * sum_k exp(-s_k d) G(s_k) / s_k

@@ -46,7 +46,7 @@ class Truncated:
 
 
 def minreal(tf: TransferFunction, tolerance: float = 1e-3) -> Cancelled:
-    """Without pairs of pole and zero nearer to each other than ``tolerance`` of their size; keeps the gain and the delay."""
+    """The model without pairs of pole and zero that are closer than ``tolerance`` of their size; keeps the gain and the delay."""
     poles, zeros = tf.poles(), tf.zeros()
     smallest = 1e-3 if tf.sampling_time is not None else 1e-6 * float(np.max(np.abs(poles), initial=1e-300))
     removed: list[complex] = []

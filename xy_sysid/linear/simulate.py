@@ -19,8 +19,8 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
-FINER = 8  # steps in a sample of an input that is not held
-WHOLE = 1e-9  # a delay within this part of a sample is a whole number of samples
+FINER = 8  # steps per sample for an input that is not held
+WHOLE = 1e-9  # a delay within this fraction of a sample counts as an integer number of samples
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,16 +122,16 @@ def _run(
 
 
 def held_response(tf: TransferFunction, frequency: FloatArray, sampling_rate: float) -> ComplexArray:
-    """(m,) exact response from held samples to samples: zero-order hold, delay, plant, sampler.
+    """(m,) exact response from held input samples to output samples: zero-order hold, delay, plant, sampler.
 
-    The sampled form at z = exp(j w T), so right for poles of any speed; a discrete function answers as it is.
+    The sampled form at z = exp(j w T), correct for poles of any speed; a discrete function is used unchanged.
     Raises BadInput if it has more zeros than poles.
     """
     if tf.sampling_time is not None:
         return tf.response(frequency)
     s = stepper(tf, sampling_rate)
     turns = np.asarray(frequency, dtype=np.float64) / sampling_rate
-    standing = turns == np.rint(turns)  # a multiple of the sampling rate is seen as 0 Hz
+    standing = turns == np.rint(turns)  # a multiple of the sampling rate appears at 0 Hz
     z = np.exp(2j * np.pi * np.where(standing, 0.5, turns))
     driven = s.new + s.old / z[:, None]
     state = np.linalg.solve(z[:, None, None] * np.eye(s.out.size) - s.step, driven[:, :, None])[:, :, 0]
@@ -140,7 +140,7 @@ def held_response(tf: TransferFunction, frequency: FloatArray, sampling_rate: fl
 
 
 def discrete(tf: TransferFunction, sampling_rate: float) -> TransferFunction:
-    """The exact z form behind a zero-order hold; a part of a sample of delay adds one pole at z = 0."""
+    """The exact z form after a zero-order hold; a fractional delay adds one pole at z = 0."""
     if tf.sampling_time is not None:
         return tf
     s = stepper(tf, sampling_rate)
@@ -157,15 +157,15 @@ def discrete(tf: TransferFunction, sampling_rate: float) -> TransferFunction:
     )
 
 
-RUNS_AWAY = -1e5  # per cent: an error of a thousand times the motion is not worth a number
+RUNS_AWAY = -1e5  # per cent: for an error of a thousand times the motion no number is given
 
 
 @dataclass(frozen=True, slots=True)
 class SimulationError:
-    """How a simulation differs from what was measured.
+    """Difference between a simulation and the measurement.
 
     rms:     of the difference, in ``unit``
-    nrmse:   100 (1 - |difference| / |measured - mean|), per cent; 100 is perfect; -inf, and rms inf, for a model that runs away
+    nrmse:   100 (1 - |difference| / |measured - mean|), per cent; 100 is perfect; -inf, and rms inf, for a model that diverges
     compared: "output", or "velocity" (the output's difference times the rate) for an integrating model
     seconds: of data compared
     """
@@ -178,7 +178,7 @@ class SimulationError:
 
 
 def simulate_sampled(tf: TransferFunction, sampling_rate: float, values: FloatArray, hold: Literal["zoh", "none"] = "zoh") -> FloatArray:
-    """(n,) answer, from rest, to an input of which the samples (n,) are known: held from each to the next, or band-limited between them."""
+    """(n,) response, from rest, to input samples (n,): held from each to the next, or band-limited between them."""
     if hold == "zoh" or tf.sampling_time is not None:
         return simulate(tf, sampling_rate, values)
     from scipy.signal import resample_poly

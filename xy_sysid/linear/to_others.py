@@ -12,9 +12,9 @@ from xy_sysid.linear.transfer_function import TransferFunction
 
 
 def to_control(model: TransferFunction | AnyModel, pade_order: int = 4) -> Any:
-    """A python-control TransferFunction; the delay of a continuous one becomes a Pade form, of a discrete one whole steps.
+    """A python-control TransferFunction; a continuous delay becomes a Pade form, a discrete one an integer number of steps.
 
-    Of a model with physical effects it is the linear part. Raises MissingExtra when python-control is not installed.
+    For a model with physical effects, its linear part. Raises MissingExtra if python-control is not installed.
     """
     try:
         import control

@@ -13,12 +13,12 @@ from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import derivative_of
 
-ON_THE_EDGE = 1e-9  # relative distance from the stability limit that counts as on it
+ON_THE_EDGE = 1e-9  # relative distance from the stability limit that counts as on the limit
 
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """A root (rad/s, or z) seen as an oscillator: natural frequency in Hz and damping ratio (1 or -1 for a real root)."""
+    """A root (rad/s, or z) as an oscillator: natural frequency in Hz and damping ratio (1 or -1 for a real root)."""
 
     root: complex
     frequency: float
@@ -85,9 +85,9 @@ class TransferFunction:
 
     @property
     def gain(self) -> float:
-        """Limit of s^integrators H(s) at s = 0: static gain; with one integrator the velocity gain.
+        """Limit of s^integrators H(s) at s = 0: static gain, or velocity gain with one integrator.
 
-        Of a velocity or an acceleration that of the position: the zeros at s = 0 that differentiating it makes are divided out.
+        For a velocity or acceleration output, the gain of the position: the zeros at s = 0 from differentiation are divided out.
         """
         count = self.integrators
         if self.sampling_time is None:
@@ -108,7 +108,7 @@ class TransferFunction:
 
     @property
     def is_stable(self) -> bool:
-        """No pole beyond the limit of stability; integrators are allowed, repeated ones too, as they are physical."""
+        """True if no pole is beyond the stability limit; integrators are allowed, also repeated ones, because they are physical."""
         return unstable(self.poles(), self.sampling_time).size == 0
 
     @property
@@ -126,7 +126,7 @@ class TransferFunction:
         return _modes(self.zeros(), self.sampling_time)
 
     def pade(self, order: int = 4) -> TransferFunction:
-        """The same without delay: exp(-s delay) as a Pade quotient; whole samples of a discrete function become poles at 0."""
+        """The function without delay: exp(-s delay) becomes a Pade quotient; integer samples of a discrete function become poles at 0."""
         if self.delay == 0.0:
             return self
         if self.sampling_time is not None:
@@ -150,7 +150,7 @@ def _rational(tf: TransferFunction, variable: ComplexArray) -> ComplexArray:
 
 
 def _polynomial(coefficients: FloatArray, variable: str) -> str:
-    """Falling powers with four digits, what is zero left out."""
+    """The polynomial in falling powers with four digits; zero coefficients are omitted."""
     text = ""
     for power, value in zip(range(coefficients.size - 1, -1, -1), coefficients.tolist(), strict=True):
         if value == 0.0:
@@ -176,7 +176,7 @@ def _roots(coefficients: FloatArray) -> ComplexArray:
 
 
 def unstable(roots: ComplexArray, sampling_time: float | None) -> ComplexArray:
-    """Those beyond the limit of stability."""
+    """The roots beyond the stability limit."""
     if sampling_time is not None:
         return np.asarray(roots[np.abs(roots) > 1.0 + 1e-6])
     return np.asarray(roots[roots.real > ON_THE_EDGE * np.abs(roots)])

@@ -1,10 +1,10 @@
-"""The online logic: samples and time are arguments; it never asks for them.
+"""The online logic: samples and time are arguments; it never reads a clock or a stream.
 
 identifier:      samples in, requests for fits out
-fitter:          fits that follow one another
-resonance_watch: has a resonance moved away
+fitter:          a sequence of fits
+resonance_watch: whether a resonance has moved
 plain_messages:  a message of each type as plain values
-messages:        what goes on the topics, as plain numbers and words
-diagnoser:       what a live diagnosis does when
-replay:          the same logic on blocks from anywhere
+messages:        content of the topics, as plain numbers and words
+diagnoser:       the sequence of a live diagnosis
+replay:          the same logic on blocks from any source
 """

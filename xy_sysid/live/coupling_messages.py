@@ -1,4 +1,4 @@
-"""What goes on the topics about two axes that are driven at once: the cross responses, the coupling by band, and the verdict."""
+"""Topic content for two axes driven at the same time: the cross responses, the coupling by band, and the verdict."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ COUPLING_COLUMNS = ("low", "high", "at_least", "at_most")
 
 
 def coupling_topics(axes: tuple[str, ...]) -> tuple[str, ...]:
-    """The topics of the first two axes; none of one axis."""
+    """The topics of the first two axes; empty for a single axis."""
     if len(axes) < 2:
         return ()
     one, other = axes[:2]
@@ -33,13 +33,13 @@ def coupling_messages(found: Coupling) -> list[ArrayMessage]:
 
 
 def coupling_status(found: Coupling) -> StatusMessage:
-    """``metrics``: the verdict; WARN where two single-axis models do not suffice."""
+    """``metrics``: the verdict; WARN if two single-axis models do not suffice."""
     values = {"largest (1)": f"{found.largest:.6g}", "suffice": str(found.suffice).lower(), "at least (1)": f"{float(np.max(found.coupling)):.6g}"}
     return StatusMessage(coupling_name(found.axes), WARN if found.coupled else OK, found.sentence, tuple(values.items()))
 
 
 def coupling_name(axes: tuple[str, ...]) -> str:
-    """Of the status."""
+    """The name of the status."""
     return f"coupling of {axes[0]} and {axes[1]}"
 
 

@@ -1,7 +1,7 @@
 """The sequence of a live diagnosis: requests come in, jobs go out one at a time, stories come back. No thread, no clock, no IO.
 
-A story stays with the samples it began with, so that its ladder compares like with like; ``diagnose`` and ``renew`` begin again. Each axis
-can be asked for by itself: what is done for one leaves the others as they are.
+A story keeps the samples that it started with, so that its errors are comparable; ``diagnose`` and ``renew`` start again. Each axis
+can be requested separately: work for one axis does not affect the others.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from xy_sysid.settings import DiagnoserSettings
 from xy_sysid.story.acts import ANEW, Act, Job, perform, sentence, unheard
 from xy_sysid.story.story import Story
 
-WAITS = "waits"  # what an axis does that is asked for and not under way
+WAITS = "waits"  # state of an axis whose request has not started
 BEGINS: dict[Act, str] = {
     "begin": "fitting the rigid model",
     "diagnose": "fitting the rigid model",
@@ -33,7 +33,7 @@ BEGINS: dict[Act, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What became of a request: its number, whether it was done, and a sentence for each axis."""
+    """The result of a request: its number, whether it succeeded, and a sentence for each axis."""
 
     request: int
     done: bool
@@ -45,13 +45,13 @@ class _Request:
     number: int
     act: Act
     axes: deque[str]
-    whole: tuple[str, ...]  # all axes that were asked for; none after what was heard has been forgotten
+    whole: tuple[str, ...]  # all requested axes; empty after a reset of the received data
     told: list[str] = field(default_factory=list)
     done: bool = True
 
 
 class Diagnoser:
-    """ask(..) and start() -> Job; progress(..) and finish(..) with what the worker says; answers()."""
+    """Call ask(..), then start() -> Job; progress(..) and finish(..) with the worker's reports; answers() for replies."""
 
     def __init__(self, settings: DiagnoserSettings, axes: tuple[str, ...]) -> None:
         self.axes = axes
@@ -62,31 +62,31 @@ class Diagnoser:
         self._queue: deque[_Request] = deque()
         self._answers: list[Reply] = []
         self._data: dict[str, Run] = {}
-        self._ends: dict[str, tuple[Newest, float]] = {}  # hearing, and s heard there, when an axis' samples were taken
-        self.under_way = ""  # the axis that the worker works for
+        self._ends: dict[str, tuple[Newest, float]] = {}  # for each axis the hearing and its time in s when its samples were taken
+        self.under_way = ""  # the axis of the current job
         self._number = 0
         self.reset()
 
     def reset(self) -> None:
-        """Delete received data; stories stay."""
+        """Delete received data; keep the stories."""
         for request in self._queue:
             request.whole = ()
         self.hearing = Newest(self.axes, self._settings.memory, self._settings.minimum, self._settings.reorder)
         self._next_time = self._settings.interval
 
     def change(self, settings: DiagnoserSettings) -> None:
-        """Use other settings from now on; those of the memory restart it."""
+        """Use other settings from now on; changed memory settings delete the received data."""
         before, self._settings = self._settings, settings
         if (before.memory, before.minimum, before.reorder) != (settings.memory, settings.minimum, settings.reorder):
             self.reset()
 
     @property
     def busy(self) -> bool:
-        """Something is done or waits to be done."""
+        """True if a job runs or waits."""
         return bool(self._queue)
 
     def feed(self, kind: Quantity, block: Block) -> None:
-        """Take one block of one stream; the diagnosis that falls due by the interval is asked for."""
+        """Read one block of one stream; request a diagnosis if the interval is over."""
         self.hearing.feed(kind, block)
         interval, rate = self._settings.interval, self.hearing.sampling_rate
         if interval > 0.0 and rate and self.hearing.total >= self._next_time * rate:
@@ -95,8 +95,8 @@ class Diagnoser:
                 self.ask("diagnose")
 
     def ask(self, act: Act, axes: Iterable[str] | None = None) -> int:
-        """Queue a request, for all axes or some; its number. One like it that has not begun is joined, and a diagnosis that is under way,
-        too: who asks twice, as where answers get lost, has it once."""
+        """Queue a request for all or some axes; returns its number. An equal request that waits, or a diagnosis that runs, is joined instead:
+        a request that is repeated because its answer was lost runs only once."""
         chosen = self.axes if axes is None else tuple(axes)
         for place, known in enumerate(self._queue):
             if known.act == act and known.whole == chosen and (place > 0 or act in ANEW):
@@ -106,14 +106,14 @@ class Diagnoser:
         return self._number
 
     def have(self, axis: str, effects: tuple[str, ...]) -> None:
-        """The model of an axis is to have these effects; fitted as soon as there are data."""
+        """The model of an axis shall have these effects; it is fitted as soon as there are data."""
         self.effects[axis] = effects
         story = self.stories.get(axis)
         if (story.effects if story is not None else ()) != effects or self.under_way == axis:
             self.ask("effects", [axis])
 
     def reset_model(self, axes: Iterable[str] | None = None) -> None:
-        """Back to the rigid model, without a new fit; the diagnosis stays. Raises BadInput while one of these axes is worked for."""
+        """Return to the rigid model without a new fit; keep the diagnosis. Raises BadInput while there is a job for one of these axes."""
         chosen = self.axes if axes is None else tuple(axes)
         busy = [axis for axis in chosen if axis in self.doings()]
         if busy:
@@ -124,25 +124,25 @@ class Diagnoser:
             self.effects[axis] = ()
 
     def doings(self) -> dict[str, str]:
-        """What is done for each axis that is worked for or waits."""
+        """The current activity for each axis with a running or waiting job."""
         found = {axis: WAITS for request in self._queue for axis in request.axes}
         if self.under_way:
             found[self.under_way] = self.doing.partition(": ")[2]
         return found
 
     def used(self, axis: str) -> tuple[float, float] | None:
-        """(from, to), s since the samples began to be heard, of those that the axis' story is about; None if that was before a reset."""
+        """(from, to), s since the first received sample, of the data in the axis's story; None if they are from before a reset."""
         hearing, end = self._ends.get(axis, (None, 0.0))
         if hearing is not self.hearing or axis not in self._data:
             return None
         return max(end - self._data[axis].seconds, 0.0), end
 
     def _heard(self) -> float:
-        """s of samples since they began to be heard."""
+        """s of samples since the first received one."""
         return self.hearing.total / self.hearing.sampling_rate if self.hearing.sampling_rate else 0.0
 
     def start(self) -> Job | None:
-        """The next job, once the one before is finished."""
+        """The next job, once the previous one is finished; None without one."""
         while self._queue and not self.under_way:
             request = self._queue[0]
             if not request.axes:
@@ -177,13 +177,13 @@ class Diagnoser:
         return None
 
     def progress(self, doing: str, story: Story | None) -> None:
-        """The worker has got so far."""
+        """Read a progress report of the worker."""
         self.doing = f"axis {self.under_way}: {doing}"
         if story is not None:
             self.stories[self.under_way] = story
 
     def finish(self, problem: str = "") -> None:
-        """The job under way has ended; ``problem`` if it failed."""
+        """The current job has ended; ``problem`` if it failed."""
         axis, request = self.under_way, self._queue[0]
         self.under_way, self.doing = "", ""
         story = self.stories.get(axis)
@@ -197,7 +197,7 @@ class Diagnoser:
             request.told.append(sentence(story))
 
     def cancel(self, axes: Iterable[str] | None = None) -> str:
-        """Give up what runs and waits for all axes, or some; what was given up, in words."""
+        """Cancel running and waiting jobs of all or some axes; returns what was cancelled, in words."""
         chosen = self.axes if axes is None else tuple(axes)
         doing = self.doings()
         given_up = [f"axis {axis}: {doing[axis]}" for axis in chosen if axis in doing]
@@ -217,7 +217,7 @@ class Diagnoser:
         return f"cancelled {given_up[0]}" if given_up else "nothing was running"
 
     def answers(self) -> list[Reply]:
-        """The requests that have ended since the last call."""
+        """Replies to the requests that have ended since the last call."""
         found, self._answers = self._answers, []
         return found
 
@@ -231,7 +231,7 @@ class Diagnoser:
 
 
 def all_at_once(diagnoser: Diagnoser, library: Library) -> dict[str, Story]:
-    """Each axis' story from what was heard, with every effect that helps: the service ``auto`` without a worker."""
+    """Each axis's story from the received data, with every effect that helps: the service ``auto`` without a worker."""
     diagnoser.ask("auto")
     while (job := diagnoser.start()) is not None:
         for doing, story in perform(job, library):

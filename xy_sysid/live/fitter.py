@@ -1,6 +1,6 @@
-"""Fits that follow one another: warm starts, the watch on a resonance, and what is to be published.
+"""A sequence of fits: warm starts, the watch on a resonance, and the messages to publish.
 
-``LiveFitter.fit(request)`` depends only on the requests so far, in their order, so that a replay repeats it bit for bit.
+``LiveFitter.fit(request)`` depends only on the requests so far and their order, so that a replay repeats it bit for bit.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from xy_sysid.samples.pairing import QUANTITIES, Pairer
 from xy_sysid.samples.ring import RATE_SAMPLES
 from xy_sysid.settings import IdentifierSettings
 
-LIGHT_DAMPING = 0.4  # a pole pair with more damping is no resonance to be watched
-FIRST_FITS = 3  # fits in which a warm start that noise does not explain is checked against a cold one,
-LATER_DOUBT = 15  # and every so many later: an axis with friction is never explained by noise, and a cold start is slow
-OPTIONS = FitOptions(relative_change=1e-6)  # of the cost: a hundredth of a standard error is left at the most
-GOOD_ERROR = 0.05  # relative error above which the sentence of an axis says that the model does not fit yet
+LIGHT_DAMPING = 0.4  # a pole pair with more damping is not a resonance to watch
+FIRST_FITS = 3  # fits in which a warm start that noise does not explain is checked against a cold start
+LATER_DOUBT = 15  # later, one of this many fits: noise never explains an axis with friction, and a cold start is slow
+OPTIONS = FitOptions(relative_change=1e-6)  # of the cost: leaves at most a hundredth of a standard error
+GOOD_ERROR = 0.05  # relative error above which an axis's sentence says that the model does not fit yet
 
 
 @dataclass(frozen=True, slots=True)
 class AxisUpdate:
-    """One axis after a fit; ``fit`` is None and ``problem`` says why when it could not be tried.
+    """One axis after a fit; ``fit`` is None if it was not possible, and ``problem`` gives the reason.
 
-    stretch: fit of the newest windows with the structure of the baseline, where they share no sample with those of the stretch before
+    stretch: fit of the newest windows with the structure of the baseline, if they share no sample with the previous stretch
     """
 
     frf: FrequencyResponse
@@ -74,15 +74,15 @@ class Update:
         return found + ([] if self.request.coupling is None else coupling_messages(self.request.coupling))
 
     def statuses(self) -> list[StatusMessage]:
-        """``metrics``: one status per axis, and one of what two axes do to each other."""
+        """``metrics``: one status per axis, and one for the coupling of two axes."""
         found = [_status(axis, update, self.request) for axis, update in self.axes.items()]
         return found + ([] if self.request.coupling is None else [coupling_status(self.request.coupling)])
 
 
 class LiveFitter:
-    """Keeps the last model of each axis as the next start, and its resonance's history.
+    """Keeps the last model of each axis as the next start value, and the history of its resonance.
 
-    baseline: by axis, the model of commissioning, with which stretches of new data are fitted, too
+    baseline: by axis, the model of commissioning; stretches of new data are fitted with its structure, too
     """
 
     def __init__(self, settings: IdentifierSettings, baseline: Mapping[str, TransferFunction] | None = None) -> None:
@@ -103,19 +103,19 @@ class LiveFitter:
         self._tracks.clear()
 
     def references(self) -> dict[str, Resonance]:
-        """The resonance that each axis is watched against."""
+        """The reference resonance of each axis."""
         return {axis: track.reference for axis, track in self._tracks.items() if track.reference}
 
     def restore(self, references: dict[str, Resonance]) -> None:
-        """Watch against these, as before a restart."""
+        """Use these references, as before a restart."""
         self._tracks = {axis: Track(reference=reference) for axis, reference in references.items()}
 
     def state(self) -> State:
-        """The references as named arrays, to be kept over a restart."""
+        """The references as named arrays, to keep them over a restart."""
         return {f"reference/{axis}": np.array([found.frequency, found.error]) for axis, found in self.references().items()}
 
     def recall(self, state: State) -> None:
-        """Watch against what ``state`` gave."""
+        """Use the references of ``state``."""
         prefix = "reference/"
         self.restore({name.removeprefix(prefix): Resonance(*map(float, value)) for name, value in state.items() if name.startswith(prefix)})
 
@@ -124,7 +124,7 @@ class LiveFitter:
         start = self._last.get(axis)
         structure = self._structures.get(axis, structure_from(self._settings))
         try:
-            if self._settings.orders_from_data and number & (number - 1) == 0:  # 1, 2, 4, 8, ...: twice the data may tell more
+            if self._settings.orders_from_data and number & (number - 1) == 0:  # 1, 2, 4, 8, ...: twice the data may support a higher order
                 found = choose(asked.frf, structure_from(self._settings), thorough=False).fit
                 structure = self._structures[axis] = found.structure
                 start = found
@@ -151,7 +151,7 @@ class LiveFitter:
 
 
 def watched(fit: Fit, near: float | None = None) -> Resonance | None:
-    """The resonance to watch: of those in the band with little damping the least damped one, or the one nearest to ``near`` Hz."""
+    """The resonance to watch: the least damped of the lightly damped ones in the band, or the one nearest to ``near`` Hz."""
     return _light(fit.intervals, fit.frequency, near)
 
 
@@ -213,7 +213,7 @@ def _verdict(axis: str, update: AxisUpdate, request: FitRequest) -> tuple[int, s
 
 
 def warm_up(settings: IdentifierSettings) -> None:
-    """Pair made-up samples and fit a made-up response once, so that everything is compiled before data come in."""
+    """Pair artificial samples and fit an artificial response once, so that everything is compiled before data arrive."""
     rate, lines = 2000.0, 200
     pairer = Pairer(("x",), settings.reorder)
     for first in range(0, 3 * RATE_SAMPLES, RATE_SAMPLES):

@@ -11,14 +11,14 @@ from xy_sysid.samples.block import StreamName
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What came since the last look.
+    """What arrived since the last check.
 
-    silent:    streams of which no message came
+    silent:    streams without a message
     paired:    samples that were paired
-    refused:   why the newest refused message was refused, empty if none was; refusals: how many were since the start
+    refused:   reason for the newest refused message, empty without one; refusals: their number since the start
     stamps:    why stamped samples cannot be counted, empty if they can
-    sentences: what the pairing says, by reason
-    streams:   that are listened to
+    sentences: messages of the pairing, by reason
+    streams:   subscribed streams
     """
 
     silent: tuple[StreamName, ...]
@@ -31,7 +31,7 @@ class Heard:
 
 
 def verdict(heard: Heard, well: str) -> tuple[int, str]:
-    """Level and sentence of the status; ``well`` is the sentence if all is."""
+    """Level and sentence of the status; ``well`` is the sentence if there is no problem."""
     said = [heard.stamps] if heard.stamps else []
     if heard.refused:
         said.append(f"{heard.refusals} message{'s' if heard.refusals > 1 else ''} refused: {heard.refused}")

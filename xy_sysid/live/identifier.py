@@ -1,7 +1,7 @@
-"""The online logic without any IO: feed(samples) -> what is due to be fitted.
+"""The online logic without any IO: feed(samples) -> requests for fits.
 
 The same samples in any chunking, live or replayed, give the same requests, bit for bit: windows lie on a grid of the
-sample counter, and a fit falls due after a set number of seconds of data, never of clock.
+sample counter, and a fit is due after a fixed number of seconds of data, never of clock time.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from xy_sysid.settings import IdentifierSettings
 from xy_sysid.units import USUAL, Units
 
 STATE_VERSION = 1
-CUTS = ("time_jump", "restart", "unequal_rates")  # gaps after which stamps lie on another line
+CUTS = ("time_jump", "restart", "unequal_rates")  # gaps after which the line through the time stamps is another one
 
 
 @dataclass(frozen=True, slots=True)
 class AxisRequest:
-    """What one axis has to be fitted with.
+    """The data for the fit of one axis.
 
-    frf:     from all that is remembered
-    recent:  from the newest ``alarm_windows`` windows, None before there are so many
+    frf:     from all remembered windows
+    recent:  from the newest ``alarm_windows`` windows, None before there are that many
     windows: windows used so far; dropped: windows not used, by reason
     """
 
@@ -51,7 +51,7 @@ class FitRequest:
     """A fit is due.
 
     number: counts the requests from 1; seq: counter of the first sample after the newest window
-    seconds: of data heard; faults: samples or blocks not used, by reason; going_on: the reasons of the last seconds, by axis
+    seconds: of received data; faults: samples or blocks not used, by reason; going_on: reasons that still occur, by axis
     """
 
     number: int
@@ -61,11 +61,11 @@ class FitRequest:
     axes: dict[str, AxisRequest]
     faults: dict[str, int]
     going_on: dict[str, tuple[str, ...]]
-    coupling: Coupling | None = None  # of the first two axes; None of one axis, in closed loop, and as long as it is not known
+    coupling: Coupling | None = None  # of the first two axes; None for one axis, in closed loop, and while it is unknown
 
 
 class Identifier:
-    """Pairs, cuts windows, runs spectra; ``feed`` gives the fits that fall due."""
+    """Pairs samples, cuts windows, updates spectra; ``feed`` returns the fits that are due."""
 
     _both: RunningCrossSpectra | None  # of the first two axes
 
@@ -81,7 +81,7 @@ class Identifier:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything that was heard."""
+        """Delete all received data."""
         self._pairer: Pairer | None = None
         self._rate: float | None = None
         self._line = StampLine()
@@ -100,22 +100,22 @@ class Identifier:
         self._number = 0
 
     def change(self, settings: IdentifierSettings) -> None:
-        """Use other settings from now on that leave the spectra what they are (band, refit, coherence, frozen)."""
+        """Use other settings from now on; only those that do not change the spectra (band, refit, coherence, frozen)."""
         self.settings = settings
 
     @property
     def sampling_rate(self) -> float | None:
-        """Hz, from all stamps of the samples in the windows; None until it is known."""
+        """Hz, from all time stamps of the samples in the windows; None while it is unknown."""
         return self._rate and (self._line.rate or self._rate)
 
     @property
     def samples(self) -> int:
-        """Paired samples heard."""
+        """Number of paired samples received."""
         return self._samples
 
     @property
     def faults(self) -> dict[str, int]:
-        """What was wrong with the streams, counted by reason."""
+        """Number of faults in the streams, by reason."""
         sources = (self._pairer.counts if self._pairer else Counter[str](), self._hold.counts if self._hold else Counter[str]())
         return dict(sum(sources, self._counts.copy()))
 
@@ -126,23 +126,23 @@ class Identifier:
 
     @property
     def windows(self) -> dict[str, int]:
-        """Windows used, by axis."""
+        """Number of windows used, by axis."""
         return {axis: self._used[axis] for axis in self.axes}
 
     @property
     def dropped(self) -> dict[str, dict[str, int]]:
-        """Windows not used, by axis and reason."""
+        """Number of windows not used, by axis and reason."""
         return {axis: dict(self._dropped[axis]) for axis in self.axes}
 
     @property
     def waiting(self) -> dict[StreamName, int]:
-        """Newest counter of each stream; -1 is silence."""
+        """Newest counter of each stream; -1 before the first sample."""
         paired = self._pairer.waiting if self._pairer else dict.fromkeys(QUANTITIES, -1)
         streams: dict[StreamName, int] = {kind: paired[kind] for kind in QUANTITIES}
         return streams | ({"reference": self._hold.newest} if self._hold else {})
 
     def feed(self, kind: StreamName, block: Block) -> list[FitRequest]:
-        """Take one block of one stream; the fits that fall due, in order. The reference counts in closed loop alone."""
+        """Read one block of one stream; returns the fits that are due, in order. The reference is used in closed loop only."""
         requests: list[FitRequest] = []
         for event in self._events(kind, block):
             requests += self._gap(event) if isinstance(event, Gap) else self.take(event)
@@ -157,7 +157,7 @@ class Identifier:
         return paired if self._hold is None else [event for one in paired for event in self._hold.take(one)]
 
     def take(self, samples: Samples, sampling_rate: float | None = None) -> list[FitRequest]:
-        """Take samples that are paired already; windows of samples without a known rate are counted and dropped."""
+        """Read samples that are already paired; windows of samples without a known rate are counted and dropped."""
         self._samples += len(samples)
         if samples.time is not None and sampling_rate is None:
             self._line.add(samples.seq, samples.time)
@@ -174,7 +174,7 @@ class Identifier:
         return requests
 
     def _follow_rate(self, before: float) -> float:
-        """The rate of the samples that come now; spectra of another one are given up, and that is said."""
+        """The rate of the current samples; spectra of another rate are deleted, with a message."""
         rate = self._pairer.rate if self._pairer is not None else None
         if rate is None or abs(rate / before - 1.0) <= RATE_TOLERANCE:
             return before
@@ -219,7 +219,7 @@ class Identifier:
         return [self.request(end, self._line.rate or rate)]
 
     def _start_coupling(self) -> None:
-        """Of two axes whose inputs are what drives them; it remembers all since the start, and is not kept over a restart."""
+        """For two axes whose inputs are the drive; uses all data since the start, and is not kept over a restart."""
         judged = len(self.axes) > 1 and self.settings.response == "h1" and self.settings.differenced
         self._long = WindowShape.of(self.settings.window, LONGER * self.settings.length, self.settings.overlap)
         self._both = RunningCrossSpectra(self._long) if judged else None
@@ -227,7 +227,7 @@ class Identifier:
         self._long_windows: deque[Window] = deque()
 
     def _hear_both(self, until: int, frozen: int) -> None:
-        """Long windows up to a counter, of which neither encoder stands or leaps."""
+        """Add long windows up to a counter, except those in which an encoder is frozen or jumps."""
         while self._both is not None and self._long_windows and self._long_windows[0].index * self._long.hop + self._long.length <= until:
             window = self._long_windows.popleft()
             if not any(window_fault(window.voltage[:, k], window.position[:, k], frozen) for k in (0, 1)):
@@ -250,7 +250,7 @@ class Identifier:
             self._recent[axis] = self._method.running(self._shape, 1.0, self.settings.alarm_windows)
 
     def request(self, seq: int, rate: float) -> FitRequest:
-        """What there is to fit now."""
+        """The fit request for the present data."""
         axes: dict[str, AxisRequest] = {}
         seconds = self._samples / rate
         streams = [reason for reason, count in self.faults.items() if self._complaints.goes_on(reason, count, seconds)]
@@ -290,7 +290,7 @@ class Identifier:
         return self._method.estimate(running.get(), self._shape, rate, options)
 
     def state(self) -> State:
-        """Everything learnt, as named arrays, to go on after a restart."""
+        """All estimates as named arrays, to continue after a restart."""
         settings = self.settings
         state: State = {
             "version": np.array([STATE_VERSION], dtype=np.float64),
@@ -307,11 +307,11 @@ class Identifier:
 
     @property
     def _named(self) -> tuple[str, ...]:
-        """What states of output over input, the first method, do not name."""
+        """Names for the states; states of output over input, the first method, have none."""
         return () if self.settings.response == "h1" else (self.settings.response,)
 
     def restore(self, state: State) -> None:
-        """Go on from a saved state; raises BadInput if it was made with other axes or windows."""
+        """Continue from a saved state; raises BadInput if it has other axes or windows."""
         fresh = self.state()
         for name in ("version", "axes", "key"):
             if name not in state or not np.array_equal(state[name], fresh[name]):

@@ -1,4 +1,4 @@
-"""What goes on the topics, as plain numbers and words: the node and the replay send the same."""
+"""Topic content as plain numbers and words, shared by the node and the replay."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def comparison_message(axis: str, fit: Fit) -> ArrayMessage:
 def transfer_function_message(axis: str, tf: TransferFunction) -> ArrayMessage:
     """``transfer_function/<axis>``: coefficients of falling powers of s, then the delay in s.
 
-    Three dimensions that name the parts of ``data``, one after the other: numerator, denominator, delay.
+    Three dimensions name the consecutive parts of ``data``: numerator, denominator, delay.
     """
     data = np.concatenate((tf.numerator, tf.denominator, [tf.delay]))
     sizes = (tf.numerator.shape[0], tf.denominator.shape[0], 1)

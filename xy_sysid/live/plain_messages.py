@@ -1,4 +1,4 @@
-"""A message of each type that the nodes send, as plain values, and the topic that it goes on."""
+"""A message of each type that the nodes send, as plain values, and its topic."""
 
 from __future__ import annotations
 
@@ -31,6 +31,6 @@ class StatusMessage:
 
 
 def topic_of(kind: str, axis: str) -> str:
-    """``<kind>/<axis>``; what ROS does not allow in a name, as in joint-2 or left/wrist, becomes an underscore."""
+    """``<kind>/<axis>``; characters that ROS does not allow in a name, as in joint-2 or left/wrist, become underscores."""
     name = re.sub(r"[^A-Za-z0-9_]+", "_", axis)
     return f"{kind}/{'_' if name[:1].isdigit() else ''}{name}"

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-CLEARS = 8.0  # s without anything new after which a complaint is over; statuses come each second, and a level clears within 10 s
+CLEARS = 8.0  # s without a new occurrence after which a fault is over; statuses come each second, and a level clears within 10 s
 
 
 class Recent:
-    """``goes_on`` is asked again and again, with what changes whenever the complaint is made again, such as a count."""
+    """Call ``goes_on`` repeatedly with a mark that changes at each occurrence of a fault, such as a count."""
 
     def __init__(self) -> None:
         self._last: dict[str, tuple[object, float]] = {}
 
     def goes_on(self, what: str, mark: object, now: float) -> bool:
-        """Whether the mark of this complaint has changed within CLEARS of now, s; a mark of 0 or nothing is no complaint."""
+        """True if the mark of this fault has changed within CLEARS s before now; a mark of 0 or nothing is no fault."""
         if not mark:
             return False
         before = self._last.get(what)

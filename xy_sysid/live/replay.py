@@ -1,4 +1,4 @@
-"""The identifier's logic on blocks from anywhere, as fast as it goes: the same updates, bit for bit, as the live node."""
+"""The identifier's logic on blocks from any source, at full speed: the same updates, bit for bit, as the live node."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Watch a resonance: has it moved since its first value?
+"""Watches a resonance: has it moved since its first value?
 
-Loose base bolts lower the base's stiffness, so that its antiresonance and resonance move left (the paper's finding).
+Loose base bolts lower the base's stiffness, so that its antiresonance and resonance frequencies fall (the paper's finding).
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 from xy_sysid.response.frf import Z95
 
-REFERENCE_WINDOWS = 12  # windows from which the reference may be taken; before that its interval is too wide to be of use
-REFERENCE_GROWS = 60  # up to so many windows a better reference replaces the first one, as long as nothing has moved
+REFERENCE_WINDOWS = 12  # least number of windows for a reference; with fewer its interval is too wide to be useful
+REFERENCE_GROWS = 60  # up to this many windows a better reference replaces the first one, if the resonance has not moved
 CONFIRM = 2  # consecutive fits that must agree before an alarm; one alone may be chance
 
 
@@ -25,11 +25,11 @@ class Resonance:
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """What is known of one resonance over time.
+    """The history of one resonance.
 
-    reference: where it was; None before there is one
-    now:       newest short-memory value; None while there is none
-    away:      consecutive fits in which it was away; alarm: whether that is confirmed
+    reference: its first value; None before there is one
+    now:       newest short-memory value; None without one
+    away:      consecutive fits in which it differed; alarm: True if that is confirmed
     """
 
     reference: Resonance | None = None
@@ -46,7 +46,7 @@ class Track:
 def follow(track: Track, overall: Resonance | None, recent: Resonance | None, windows: int, sigmas: float) -> Track:
     """The track after one more fit.
 
-    overall: from all that is remembered, with ``windows`` windows; recent: from the short memory
+    overall: from all remembered data, with ``windows`` windows; recent: from the short memory
     sigmas:  standard errors of the difference that count as moved
     """
     if track.reference is None or recent is None:
@@ -62,7 +62,7 @@ def follow(track: Track, overall: Resonance | None, recent: Resonance | None, wi
 
 
 def alarm_sentence(axis: str, track: Track) -> str:
-    """What the alarm says, for people."""
+    """The alarm as a sentence."""
     if not (track.reference and track.now):
         return f"axis {axis}: the resonance has moved"
     direction = "down" if track.shift < 0 else "up"

@@ -1,4 +1,4 @@
-"""Fits of stretches of data that have no sample in common, each with the structure of a model that the axis is compared with."""
+"""Fits of stretches of data without common samples, each with the structure of the model that the axis is compared with."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from xy_sysid.settings import IdentifierSettings
 
 @dataclass(frozen=True, slots=True)
 class FittedStretch:
-    """The fit of the newest ``alarm_windows`` windows. begin, end: number of the first window, and of the first one that shares no sample with it."""
+    """Fit of the newest ``alarm_windows`` windows. begin, end: number of the first window, and of the first window without a common sample."""
 
     fit: Fit
     begin: int
@@ -27,15 +27,15 @@ class FittedStretch:
 
 
 class StretchFits:
-    """models: by axis, the transfer function in s that its stretches are compared with; axes without one are left alone."""
+    """models: by axis, the transfer function in s for comparison with its stretches; other axes are not fitted."""
 
     def __init__(self, settings: IdentifierSettings, models: Mapping[str, TransferFunction], options: FitOptions) -> None:
         self._settings, self._models, self._options = settings, models, options
-        self._shared = math.ceil(1.0 / (1.0 - settings.overlap))  # windows until one shares no sample with another
+        self._shared = math.ceil(1.0 / (1.0 - settings.overlap))  # windows between two that share no sample
         self._ends: dict[str, int] = {}
 
     def fit(self, axis: str, asked: AxisRequest) -> FittedStretch | None:
-        """The fit of the newest windows, where all of them lie behind those of the fit before it; None where they don't, or it fails."""
+        """The fit of the newest windows if all of them are later than those of the previous fit; None otherwise, or if it fails."""
         begin, end = asked.windows - self._settings.alarm_windows, asked.windows - 1 + self._shared
         model = self._models.get(axis)
         if model is None or asked.recent is None or begin < self._ends.get(axis, 0):

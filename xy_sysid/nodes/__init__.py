@@ -1,6 +1,6 @@
 """ROS 2 nodes: thin adapters around the core.
 
-One thread for linear algebra: the same bits on every run, and no core taken from the data path. Set before numpy is loaded.
+Linear algebra runs in one thread: the same bits on every run, and no core is taken from the data path. Set before numpy is imported.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a controller of ros2_control hears and says: one number a joint, on time, and joint states.
+"""The interface to a controller of ros2_control: one number per joint, on time, and joint states.
 
 The controllers of the kind (forward_command_controller, effort_controllers, velocity_controllers, position_controllers) take a
 ``std_msgs/Float64MultiArray`` of one number a joint in their own order, without a layout, and keep to the last one they got.
@@ -28,9 +28,9 @@ from xy_sysid.samples.joint_fields import joints_of
 from xy_sysid.settings import ExcitationSettings, given
 
 COMMAND_QOS = QoSProfile(depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)  # only the newest one counts
-STATE_QOS = QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST)  # only the newest one counts for guards
-BLOCK_TOPICS = ("voltage", "position", "reference")  # last parts of names under which blocks travel
-SLEEP = 0.0002  # s that a sleep may come late: the rest of the way is waited for awake
+STATE_QOS = QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST)  # guards use only the newest one
+BLOCK_TOPICS = ("voltage", "position", "reference")  # last parts of the names of topics with blocks
+SLEEP = 0.0002  # s that a sleep may be late: the remaining time is waited for without sleep
 
 
 class Commands:
@@ -57,18 +57,18 @@ class Commands:
             allowed = f"each joint once, with {', '.join(self._joints)} among them"
             raise BadInput("controller_joints", ", ".join(self._order), allowed, "Write them as controllers.yaml has them.")
         self._others = tuple(joint for joint in self._order if joint not in self._joints)
-        self._heard = False  # a joint of ours
-        self._kept: dict[str, float] = {}  # where positions are sent: the others stay where they are
+        self._heard = False  # a joint of ours has been received
+        self._kept: dict[str, float] = {}  # for position commands: the other joints hold these
         self._on_positions, self._complain, self._holds = on_positions, complain, settings.holds
         self.publisher = node.create_publisher(self.says, settings.command_topic, COMMAND_QOS)
         self.states = Ear(node, JointState, settings.joint_topic, self._on_states, STATE_QOS)
 
     def send(self, drive: Drive, values: FloatArray, at: float) -> bool:
-        """What the drive gave last, (axes,) values of ROS time ``at``, s; nothing is sent, and False, as long as a number is not known."""
+        """Send the drive's newest values, (axes,) for ROS time ``at``, s; returns False, and sends nothing, while a number is unknown."""
         return self._send(values)
 
     def rest(self, drive: Drive) -> None:
-        """What is safe."""
+        """Send the safe output."""
         self._send(drive.safe)
 
     def _send(self, values: FloatArray) -> bool:
@@ -79,7 +79,7 @@ class Commands:
         return True
 
     def _of_all(self, values: FloatArray, others: Mapping[str, float]) -> FloatArray:
-        """(..., joints) in the order of the controller, of (..., axes) values; NaN where one is not known."""
+        """(..., joints) in the controller's order, from (..., axes) values; NaN where unknown."""
         known = dict(zip(self._joints, np.moveaxis(values, -1, 0), strict=True))
         return np.stack([known.get(joint, np.full(values.shape[:-1], others.get(joint, np.nan))) for joint in self._order], axis=-1)
 
@@ -87,7 +87,7 @@ class Commands:
         ours = not set(self._joints).isdisjoint(message.name)
         self._heard = self._heard or ours
         if self._heard and not set(self._order) & set(message.name):
-            return  # of another publisher on the topic
+            return  # from another publisher on the topic
         if len(message.position) != len(message.name):
             self._complain(f"joint states: {len(message.name)} joints with {len(message.position)} positions")
             return
@@ -109,12 +109,12 @@ class Commands:
                 self._kept.setdefault(joint, places[joint])
 
     def forget(self) -> None:
-        """Where the other joints were: they may be elsewhere by the next start."""
+        """Delete the positions of the other joints: they may differ at the next start."""
         self._kept.clear()
 
 
 class Beat:
-    """A thread that calls ``step(skipped)`` once a period of the steady clock, skipped being how many periods were missed before."""
+    """A thread that calls ``step(skipped)`` once per period of the steady clock; skipped: number of periods missed before."""
 
     def __init__(self, period: float, step: Callable[[int], None]) -> None:
         self.clock = Clock(period, time.monotonic())
@@ -124,11 +124,11 @@ class Beat:
 
     @property
     def alive(self) -> bool:
-        """Whether it still beats."""
+        """True while the thread runs."""
         return self._thread.is_alive()
 
     def close(self) -> None:
-        """No step begins after this."""
+        """Stop; no step starts after this."""
         self._over.set()
         if threading.current_thread() is not self._thread:
             self._thread.join()

@@ -1,4 +1,4 @@
-"""What the nodes share: topics, their quality of service, and parameters made from the settings."""
+"""Shared by the nodes: topics, their quality of service, and parameters made from the settings."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ DATA_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=R
 LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 STOP_TOPIC = "stop"  # std_msgs/Bool: true is zero volts now and no activate until false
-# Heard twice: what was latched before the node was there, and whoever publishes without latching or reliability. The depth is that of all
+# Two subscriptions: one for messages latched before the node started, one for publishers without latching or reliability. The depth is that of all
 # publishers together: at a depth of 1 the false of one would hide the true of another.
 STOP_HEARD = (
     QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL),
     QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
 )
 
-OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # parameters that rclpy has by itself
+OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # parameters that rclpy declares itself
 
 
 class WalledNode(Overridable):
-    """A node whose callbacks stand behind a wall, and which has nothing to do before it ends."""
+    """A node whose callbacks are protected against errors, and which has nothing to do before it ends."""
 
     exit_code: int | None = None
 
@@ -70,18 +70,18 @@ class WalledNode(Overridable):
         return super().create_timer(timer_period_sec, self.wall.around(callback), *rest, **more)
 
     def ask_to_stop(self, reason: str) -> None:
-        """Nothing to begin."""
+        """Nothing to do."""
 
     def has_stopped(self) -> bool:
-        """At once."""
+        """True at once."""
         return True
 
     def last_words(self) -> None:
-        """None."""
+        """Nothing to publish."""
 
 
 class Parameters(Generic[AnySettings]):
-    """The settings as the node's parameters have them now; ``accept`` may refuse a change by raising BadInput."""
+    """The settings with the node's current parameter values; ``accept`` may refuse a change by raising BadInput."""
 
     def __init__(self, settings: AnySettings, accept: Callable[[AnySettings], None] | None) -> None:
         self.settings = settings
@@ -108,7 +108,7 @@ def overrides(node: Node) -> dict[str, Any]:
 
 
 def settings_from_parameters(node: Node, cls: type[AnySettings]) -> AnySettings:
-    """The settings as the node's declared parameters have them now; raises BadInput if they do not fit together."""
+    """The settings with the node's declared parameter values; raises BadInput if they are inconsistent."""
     known = {item.name for item in knobs(cls())}
     return build(cls, {name: value for name, value in overrides(node).items() if name in known}, f"node {node.get_name()}")
 
@@ -120,7 +120,7 @@ def declare(
     also: Collection[str] = (),
     fixed: Collection[str] | None = (),
 ) -> Parameters[AnySettings]:
-    """Declare every knob with its type, meaning, unit and limits; take what was given; keep up with changes.
+    """Declare every setting with its type, meaning, unit and limits; apply the given values; follow changes.
 
     The node must be made with automatically_declare_parameters_from_overrides. also: names that the node declares itself;
     fixed: those that never change while it runs, None for all of them; rclpy refuses them before it asks ``accept``.
@@ -146,14 +146,14 @@ def declare(
 
 
 def declare_fixed(node: Node, name: str, value: Any, meaning: str) -> None:
-    """A parameter that is given when the node starts and never changes."""
+    """Declare a parameter that is set when the node starts and never changes."""
     if node.has_parameter(name):
         node.undeclare_parameter(name)
     node.declare_parameter(name, value, ParameterDescriptor(read_only=True, description=meaning), ignore_override=True)
 
 
 def describe(item: Knob, fixed: bool = False) -> ParameterDescriptor:
-    """Meaning, unit and limits in ROS' words."""
+    """Meaning, unit and limits as a ParameterDescriptor."""
     unit = f" [{item.unit}]" if item.unit else ""
     descriptor = ParameterDescriptor(
         read_only=fixed,

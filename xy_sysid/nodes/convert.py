@@ -1,6 +1,6 @@
 """Plain messages and blocks of samples to ROS 2 messages and back: one codec for Float64MultiArray, one for DiagnosticStatus.
 
-An array.array is taken over whole, where a list would be checked number by number.
+An array.array is copied as a block; a list would be checked number by number.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from xy_sysid.samples.block import Block, FloatArray, columns, pack, unpack
 
 @functools.lru_cache(maxsize=64)
 def _layout(labels: tuple[str, ...], sizes: tuple[int, ...]) -> MultiArrayLayout:
-    """Two dimensions are rows and columns; of more, each is a part that follows the one before."""
+    """Two dimensions are rows and columns; with more, each one describes a consecutive part of the data."""
     strides = (sizes[0] * sizes[1], sizes[1]) if len(sizes) == 2 else sizes
     named = zip(labels, sizes, strides, strict=True)
     return MultiArrayLayout(dim=[MultiArrayDimension(label=label, size=size, stride=stride) for label, size, stride in named])
@@ -37,13 +37,13 @@ def array_to_ros(message: ArrayMessage) -> Float64MultiArray:
 
 
 def array_from_ros(topic: str, message: Float64MultiArray) -> ArrayMessage:
-    """The plain form of what came on a topic."""
+    """The plain form of a message on a topic."""
     dims = message.layout.dim
     return ArrayMessage(topic, tuple(d.label for d in dims), tuple(int(d.size) for d in dims), np.frombuffer(message.data, dtype=np.float64).copy())
 
 
 def to_message(block: Block) -> Float64MultiArray:
-    """The block as it travels."""
+    """The block as a message."""
     return _array(("sample", columns(block.axes)), (len(block), 2 + len(block.axes)), pack(block))
 
 

@@ -1,8 +1,8 @@
 """DEMO ONLY: a small controller that drives the simulated machine of ``xy-sysid demo --use`` along a path. It is no controller for a real machine.
 
-When asked (service ``~/use``) it takes the newest models from the stories, stops the excitation, and follows a path three times: with a PID alone,
-with kS, kV and kA, and with the compensation. It drives nothing where no simulated machine (node ``ballscrew``) answers. Each block of voltages is
-sent when the positions of the block before have come; so a real machine, which does not wait, cannot be driven with it.
+On request (service ``~/use``) it takes the newest models from the stories, stops the excitation, and follows a path three times: with a PID alone,
+with kS, kV and kA, and with the compensation. It drives only if a simulated machine (node ``ballscrew``) answers. Each block of voltages is
+sent when the positions of the previous block have arrived; a real machine does not wait, so it cannot be driven with this node.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ MEANINGS = {
     "limit": "largest voltage, V",
 }
 JERK_TIME = 0.02  # s in which an acceleration is built up
-LOOK, BEAT = 0.05, 0.5  # s between two looks, and between two statuses
+LOOK, BEAT = 0.05, 0.5  # s between two checks, and between two statuses
 QUIET = 0.5  # s without a position after which no drive is active
 FOUND = 0.5  # s in which the machine finds a new source of voltage
-SILENT = 3.0  # s without an answer after which the path is given up
+SILENT = 3.0  # s without an answer after which the path is cancelled
 SHOWN = 600  # rows of the table of errors at most
 IDLE, STOPPING, DESIGNING, FOLLOWING, DONE, FAILED = "idle", "stopping the excitation", "designing", "following", "done", "failed"
 BUSY = (STOPPING, DESIGNING, FOLLOWING)
@@ -106,7 +106,7 @@ class DemoFollowerNode(WalledNode):
     # what is done
 
     def _use(self) -> str:
-        """Begin. Raises BadInput where there is nothing to use, or something else is being done."""
+        """Start. Raises BadInput without a model, or during another action."""
         if self._state in BUSY:
             raise BadInput("demo_follower", self._state, "one path at a time", "Wait until it is over.")
         if self._stopped:
@@ -130,7 +130,7 @@ class DemoFollowerNode(WalledNode):
         return "the controllers are being designed; then the path is followed three times"
 
     def _design(self, models: dict[str, Any], rates: dict[str, float], floors: dict[str, float]) -> None:
-        """In a thread of its own: it takes seconds. Reads parameters, and leaves a result."""
+        """Design in a separate thread, because it takes seconds. Reads parameters and stores a result."""
         far, speed, acceleration, limit = (self._number(name) for name in PARAMETERS)
         bounds, places = Bounds(speed, acceleration, acceleration / JERK_TIME), (0.0, far, -far, 0.0)
         try:
@@ -143,7 +143,7 @@ class DemoFollowerNode(WalledNode):
 
     @property
     def _quiet(self) -> bool:
-        """No other node drives: the simulated machine publishes no positions."""
+        """True if no other node drives: the simulated machine publishes no positions."""
         return time.monotonic() - self._heard > QUIET
 
     def _look(self) -> None:
@@ -166,12 +166,12 @@ class DemoFollowerNode(WalledNode):
         columns = {axis: self._here.axes.index(axis) for axis in plans}
         self._followers = {axis: Follower(item, float(self._here.values[-1, columns[axis]]), length) for axis, item in plans.items()}
         self._rate = next(iter(plans.values())).path.sampling_rate
-        self._next, self._epoch = 0, self.get_clock().now().nanoseconds * 1e-9  # a new source of voltage begins at counter 0
+        self._next, self._epoch = 0, self.get_clock().now().nanoseconds * 1e-9  # a new source of voltage starts at counter 0
         self._voltage = self.create_publisher(Float64MultiArray, "voltage", DATA_QOS)
         self._state, self._words, self._heard = FOLLOWING, "", time.monotonic()
 
     def _send(self, here: Block) -> None:
-        """The next block, from the newest readings; the end where the path is over."""
+        """Send the next block, from the newest readings, or end after the path."""
         followers = list(self._followers.values())
         shown = here.values[:, [here.axes.index(axis) for axis in self._followers]]
         if all(item.over for item in followers):
@@ -188,7 +188,7 @@ class DemoFollowerNode(WalledNode):
         self._voltage.publish(to_message(Block(tuple(self._followers), seq, self._epoch + seq / self._rate, np.ascontiguousarray(values))))
 
     def _end(self, state: str, words: str) -> None:
-        """Zero volts, and what was found."""
+        """Send zero volts, and report the result."""
         if self._voltage is not None:
             self._publish(np.zeros((BLOCK, len(self._followers))))
             self._voltage.wait_for_all_acked()
@@ -199,7 +199,7 @@ class DemoFollowerNode(WalledNode):
         self._report()
 
     def _measure(self, whole: bool = False) -> None:
-        """rms errors of what was followed; whole: the tables, too."""
+        """rms errors so far; whole: also the tables."""
         for axis, follower in self._followers.items():
             found = follower.errors()
             self._errors[axis] = [float(np.sqrt(np.mean(item**2))) for item in found]
@@ -212,7 +212,7 @@ class DemoFollowerNode(WalledNode):
                 self._tables[axis].publish(array_to_ros(message))
 
     def _report(self) -> None:
-        """``metrics``: what is done, and the errors so far."""
+        """``metrics``: the current activity, and the errors so far."""
         values, told = {"state": self._state}, self._words
         if self._state == FOLLOWING:
             self._measure()
@@ -225,6 +225,6 @@ class DemoFollowerNode(WalledNode):
         self._metrics.publish([status("demo_follower", level, told, values)])
 
     def last_words(self) -> None:
-        """Nothing is left at a voltage."""
+        """Leave no voltage on the machine."""
         if self._voltage is not None:
             self._end(FAILED, "the controller ends")

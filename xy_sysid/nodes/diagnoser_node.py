@@ -1,6 +1,6 @@
 """Diagnoser node: receives voltage and position; on request it finds the missing effect, and the error after each added effect.
 
-Thin: ``diagnoser.Diagnoser`` knows what is to be done when, ``story_process`` does it in a process of its own.
+A thin adapter: ``diagnoser.Diagnoser`` decides what to do, ``story_process`` does it in a separate process.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from xy_sysid.story.acts import Act
 from xy_sysid.story.document import document
 from xy_sysid.story.story import Story, allowed
 
-LOOK = 0.1  # s between two looks for news
+LOOK = 0.1  # s between two checks for news
 HEARTBEAT = 1.0  # s between two statuses in metrics
-ACTS: tuple[Act, ...] = ("begin", "diagnose", "renew", "add_next", "auto")  # services, of all axes and of each
+ACTS: tuple[Act, ...] = ("begin", "diagnose", "renew", "add_next", "auto")  # services, for all axes and for each
 IDLE = "idle"
 FIXED = (*HEARING, "effect_files", "baseline", "baseline_table")
 
@@ -86,7 +86,7 @@ class DiagnoserNode(WalledNode):
     # work
 
     def _look(self) -> None:
-        """Give the worker what is to be done, and tell what it has done."""
+        """Give the worker its next job, and publish its reports."""
         for item in self._worker.news():
             if item.ended:
                 self._compare(self._diagnoser.under_way)
@@ -111,7 +111,7 @@ class DiagnoserNode(WalledNode):
             self._tell()
 
     def _compare(self, axis: str) -> None:
-        """The newest model of an axis with the one of commissioning."""
+        """Compare the newest model of an axis with the one of commissioning."""
         story, used = self._diagnoser.stories.get(axis), self._diagnoser.used(axis)
         if story is not None and story.now is not None and used is not None:
             self._since.hear(axis, story.now.parameters, *used)
@@ -121,7 +121,7 @@ class DiagnoserNode(WalledNode):
         self._stories[story.axis].publish(String(data=text))
 
     def _tell(self) -> None:
-        """``diagnosis``: every axis, and what is done now."""
+        """``diagnosis``: every axis, and the current activity."""
         diagnoser = self._diagnoser
         statuses = [
             diagnosis_status(diagnoser.stories[axis])
@@ -136,7 +136,7 @@ class DiagnoserNode(WalledNode):
         self._diagnosis.publish(statuses_to_ros(statuses, self.get_clock().now().to_msg(), "diagnoser"))
 
     def _beat(self) -> None:
-        """What is heard, once a second."""
+        """The status of the streams, once a second."""
         hearing = self._diagnoser.hearing
         level, text = verdict(self._streams.heard(hearing.total, hearing.sentences, hearing.faults), "voltage and position are received")
         text = f"{text}; {hearing.seconds:.1f} s without a gap are kept"
@@ -179,7 +179,7 @@ class DiagnoserNode(WalledNode):
                 self._diagnoser.have(axis, settings.chosen(axis))
 
     def _follow(self) -> None:
-        """The parameters effects.<axis> say what is in the models."""
+        """Set the parameters effects.<axis> to the effects in the models."""
         wrong = {axis: names for axis, names in self._diagnoser.effects.items() if names != self._own.settings.chosen(axis)}
         if wrong:
             make: Any = Parameter
@@ -208,7 +208,7 @@ class DiagnoserNode(WalledNode):
         return text
 
     def last_words(self) -> None:
-        """Nobody is left waiting."""
+        """Answer all waiting requests."""
         for service in self._triggers:
             service.give_up("the diagnoser ends")
         self._worker.close()

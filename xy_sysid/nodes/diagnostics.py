@@ -1,7 +1,7 @@
 """The status of a node: on ``metrics`` of its namespace, and on ``/diagnostics`` for monitors of the whole robot.
 
-On /diagnostics names carry the node and its namespace and hardware_id the machine, as REP 107 asks, so that two tables on one
-network are told apart; STALE, which is the aggregator's word, becomes WARN.
+On /diagnostics names contain the node and its namespace, and hardware_id the machine, as in REP 107, so that two machines on one
+network can be distinguished. STALE, which is reserved for the aggregator, becomes WARN.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Diagnostics:
         self._all.publish(DiagnosticArray(header=own.header, status=[self._known(item) for item in own.status]))
 
     def _known(self, item: DiagnosticStatus) -> DiagnosticStatus:
-        """The same under a name that is unique on the network."""
+        """The status under a name that is unique on the network."""
         node, space = self._node.get_name(), self._node.get_namespace().strip("/")
         name = self._node.get_fully_qualified_name().strip("/")
         level = WARN if item.level == STALE else item.level

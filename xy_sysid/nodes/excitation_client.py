@@ -1,4 +1,4 @@
-"""Asks the excitation for what it may do: parameters and transitions, each answered or refused in a sentence."""
+"""Client of the excitation's parameters and transitions; each request is answered, or refused with a reason."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from rclpy.signals import SignalHandlerOptions
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import ExcitationSettings, build, knobs
 
-ANSWER = 10.0  # s for an answer of the excitation,
-ASKED = 3  # times, as long as a node is there
-APPEARS = 60.0  # s until the excitation is there,
+ANSWER = 10.0  # s to wait for an answer of the excitation,
+ASKED = 3  # times, while its node is present
+APPEARS = 60.0  # s to wait for the excitation node,
 SOON = 1.0  # s, if the user wants to stop: a running excitation must still receive the request
 NODE = "excitation"
 
@@ -37,7 +37,7 @@ class ExcitationClient:
         self._executor.add_node(self._node)
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Remove the node from the graph."""
         self._node.destroy_node()
         self._context.try_shutdown()
 
@@ -47,7 +47,7 @@ class ExcitationClient:
             self._executor.spin_once(timeout_sec=0.01)
 
     def call(self, kind: Any, service: str, request: Any) -> Any:
-        """The answer; asked again if none came, as discovery loses answers while it is half done. A change of state is asked for once."""
+        """The answer; repeated if none arrives, because discovery loses answers while it is incomplete. A change of state is requested once."""
         for _ in range(1 if kind is ChangeState else ASKED):
             answer = self._ask(kind, service, request)
             if answer is not None or self._is_over():
@@ -57,7 +57,7 @@ class ExcitationClient:
         return answer
 
     def _ask(self, kind: Any, service: str, request: Any) -> Any:
-        """The answer, or None if it did not come in time."""
+        """The answer, or None after the timeout."""
         client = self._node.create_client(kind, f"{NODE}/{service}")
         asked = time.monotonic()
         while not client.service_is_ready() and time.monotonic() < asked + (SOON if self._is_over() else APPEARS):

@@ -1,7 +1,7 @@
-"""Who may open the page: checks on host, origin and token of every request, before anything else sees it.
+"""Access control for the page: checks host, origin and token of every request before the application handles it.
 
-Without these, any web page that a user has open could press buttons here (cross-site requests and WebSockets carry no
-same-origin check), or read the answers through a name that is made to point at this machine (DNS rebinding).
+Without these checks, any web page that a user has open could press buttons here (cross-site requests and WebSockets have no
+same-origin check), or read the answers through a host name that resolves to this machine (DNS rebinding).
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from urllib.parse import parse_qs, urlsplit
 
 from xy_sysid.page.address import without
 
-LARGEST = 1 << 20  # bytes of a request's body; the page itself sends next to nothing
+LARGEST = 1 << 20  # bytes of a request's body; the page itself sends very little
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 COOKIE = "xy_sysid_token"
 CONTENT = {
     "default-src": "'self'",
-    # NiceGUI evaluates event handlers, and every answer of a button, from strings (static/nicegui.js): without unsafe-eval nothing is drawn.
+    # NiceGUI evaluates event handlers and button answers from strings (static/nicegui.js); without unsafe-eval the page stays empty.
     # plotly.js does not need it.
     "script-src": "'self' 'unsafe-inline' 'unsafe-eval'",
     "style-src": "'self' 'unsafe-inline'",
-    "img-src": "'self' data: blob:",  # pictures that are kept as PNG are drawn from these
+    "img-src": "'self' data: blob:",  # needed to save figures as PNG
     "font-src": "'self' data:",
     "object-src": "'none'",
     "base-uri": "'none'",
@@ -44,7 +44,7 @@ HEADERS = {
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """The rules. token: empty is none; hosts: names by which the page may be called, empty is any (only with a token)."""
+    """The access rules. token: empty if none is needed; hosts: accepted host names, empty accepts any (only with a token)."""
 
     token: str = ""
     hosts: tuple[str, ...] = LOOPBACK
@@ -52,7 +52,7 @@ class Access:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What happens with a request: 200 is let through, else refused with these words; cookie: to be set; to: where to go instead."""
+    """The decision on a request. 200: accepted, else refused with this text; cookie: to be set; to: redirect target."""
 
     status: int = 200
     words: str = ""
@@ -61,14 +61,14 @@ class Answer:
 
 
 def rules(host: str, token: str = "") -> Access:
-    """The access that belongs to the address that is listened on: a token is needed from wherever is not this machine."""
+    """The access rules for the address that the server listens on: a token is required unless it is a loopback address."""
     if is_loopback(host):
         return Access(token, LOOPBACK)
     return Access(token or secrets.token_urlsafe(24), ())
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach that address."""
+    """True if only this machine can reach that address."""
     if host == "localhost":
         return True
     try:
@@ -78,9 +78,9 @@ def is_loopback(host: str) -> bool:
 
 
 def judge(access: Access, headers: Mapping[str, str], query: str) -> Answer:
-    """Let a request through or not.
+    """Accept or refuse a request.
 
-    headers: names in lower case; query: as it stands behind the question mark of the address
+    headers: names in lower case; query: the part of the address after the question mark
     """
     host = headers.get("host", "")
     if access.hosts and name_of(host) not in access.hosts:
@@ -111,13 +111,13 @@ def _equal(one: str, other: str) -> bool:
 
 
 def same_origin(origin: str, host: str) -> bool:
-    """Whether a page from that origin was served under that Host header."""
+    """True if a page from that origin was served under that Host header."""
     parts = urlsplit(origin)
     return parts.scheme in ("http", "https") and bool(parts.netloc) and parts.netloc.lower() == host.lower()
 
 
 def name_of(host: str) -> str:
-    """The name in a Host header, without port and brackets, in lower case; empty if it is none."""
+    """The name in a Host header, without port and brackets, in lower case; empty if the header is invalid."""
     try:
         return (urlsplit(f"//{host}").hostname or "").lower()
     except ValueError:
@@ -134,5 +134,5 @@ def cookie_of(text: str) -> str:
 
 
 def set_cookie(token: str) -> str:
-    """The header that keeps the token in the browser, out of reach of scripts and of other sites."""
+    """The header that stores the token in the browser, inaccessible to scripts and to other sites."""
     return f"{COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict"

@@ -1,7 +1,7 @@
-"""The view of the page as the query of its address: the open recordings, and for each the axis, the model, the pictures and the added effects.
+"""The view of the page as the query of its address: open recordings, and for each the axis, model, figures and added effects.
 
-``?rec=dry.npz&axis=y&model=rigid&effects=x:coulomb_friction,cogging&rec=plain.npz&units=um``: each ``rec`` (or ``live``) begins a source, and what
-follows belongs to it. What is unknown is ignored, so that an old link still opens.
+``?rec=dry.npz&axis=y&model=rigid&effects=x:coulomb_friction,cogging&rec=plain.npz&units=um``: each ``rec`` (or ``live``) starts a source;
+the following entries belong to it. Unknown entries are ignored, so that an old link still opens.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from urllib.parse import parse_qsl, urlencode
 
 from xy_sysid.units import CHOICES
 
-LONGEST = 4000  # characters that are read
-MOST = 7  # sources that are read
-OPTIONS = ("map", "unit", "scale", "rate")  # how a table is read, as options of a command without their dashes
+LONGEST = 4000  # characters of the query; the rest is ignored
+MOST = 7  # sources; the rest is ignored
+OPTIONS = ("map", "unit", "scale", "rate")  # options for reading a table, named as the command's options without dashes
 
 
 @dataclass(frozen=True, slots=True)
 class SourceView:
-    """What is shown of one recording, or of the machine.
+    """The view of one recording, or of the machine.
 
-    name: as the page lists it, empty for the machine; words: how it is read, as options of a command
-    model: empty for the newest; pictures: of the tabs that are not the first; effects: added to the model of each axis
+    name: as the page lists it, empty for the machine; words: reading options, as for a command
+    model: empty for the newest; pictures: of tabs other than the first; effects: added to the model of each axis
     """
 
     name: str = ""
@@ -35,14 +35,14 @@ class SourceView:
 
 @dataclass(frozen=True, slots=True)
 class PageView:
-    """All sources, in order; theme: light, dark, or empty for that of the system; units: those of ``units.CHOICES`` that are not the usual ones."""
+    """All sources, in order; theme: light, dark, or empty for the system's; units: those of ``units.CHOICES`` that differ from the default."""
 
     sources: tuple[SourceView, ...] = ()
     theme: str = ""
     units: tuple[str, ...] = ()
 
     def of(self, name: str) -> SourceView:
-        """The view of one source; of a source that is not named, an empty one."""
+        """The view of one source; an empty view if the source is not in the address."""
         return next((one for one in self.sources if one.name == name), SourceView(name))
 
 
@@ -61,7 +61,7 @@ def query_of(view: PageView) -> str:
 
 
 def view_of_query(query: str) -> PageView:
-    """The view that a query asks for."""
+    """The view that a query describes."""
     sources: list[SourceView] = []
     theme = ""
     units: tuple[str, ...] = ()
@@ -80,7 +80,7 @@ def view_of_query(query: str) -> PageView:
 def _pairs(query: str) -> Iterable[tuple[str, str]]:
     try:
         return parse_qsl(query[:LONGEST], max_num_fields=200)
-    except ValueError:  # too many
+    except ValueError:  # too many fields
         return ()
 
 

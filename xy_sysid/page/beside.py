@@ -1,4 +1,4 @@
-"""Work outside the page's event loop: an error becomes a sentence on the page, with its place in the log."""
+"""Work outside the page's event loop. An error becomes a sentence on the page, and its traceback goes to the log."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Made = TypeVar("Made")
 
 
 async def beside(session: Session, work: Callable[[], Awaitable[Made]]) -> Made | None:
-    """What the work gives; None where it fails, which is told to everybody."""
+    """The result of the work; None if it fails. The failure is shown on every page."""
     try:
         with Attempt(BROKEN) as attempt:
             return await work()
@@ -29,7 +29,7 @@ async def beside(session: Session, work: Callable[[], Awaitable[Made]]) -> Made 
 
 
 def asked(arguments: Sequence[str], what: tuple[str, str, str]) -> str:
-    """What a command of this program answers. what: name, value and what is allowed, of the refusal. Raises BadInput with what it says."""
+    """The output of a command of this program. what: name, value and allowed range, for the error. Raises BadInput with the command's error."""
     command = [sys.executable, "-m", "xy_sysid", *arguments]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
     if done.returncode == 0:

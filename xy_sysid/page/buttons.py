@@ -6,7 +6,9 @@ from nicegui import ui
 
 
 def heeded(button: ui.button) -> ui.button:
-    """The same button. It may be disabled while a click is on its way from the browser, as on a computer under load: that click counts still,
-    and whoever gets it decides, or says why not. NiceGUI would drop it without a word."""
+    """Accept clicks on this button although it was disabled while the click was on its way from the browser. Returns the same button.
+
+    The handler decides what to do with such a click, or gives a reason. NiceGUI would drop it silently.
+    """
     button.ignores_events_when_disabled = False
     return button

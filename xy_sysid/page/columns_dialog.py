@@ -1,4 +1,4 @@
-"""Say which column of a table is what before it is opened: ``xy-sysid columns``, and ``--map``, ``--unit``, ``--scale`` and ``--rate`` by clicks."""
+"""Dialog that assigns the columns of a table before it is opened: ``xy-sysid columns``, ``--map``, ``--unit``, ``--scale``, ``--rate`` by mouse."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ HEADS = ("column", "unit", "first", "least", "most", "looks like", "taken as")
 
 @dataclass(frozen=True, slots=True)
 class AxisColumns:
-    """What was chosen for one axis; empty units are those that the file names, and an empty factor is 1. The reference may be missing."""
+    """The choices for one axis; an empty unit means the file's unit, and an empty factor is 1. The reference is optional."""
 
     axis: str
     input: str
@@ -39,7 +39,7 @@ class AxisColumns:
 
 
 def reading_of(time: str, rate: float | None, axes: Sequence[AxisColumns], usual: Reading, time_unit: str = "") -> Reading:
-    """How the file is to be read, for the worker and as words for a command. Raises BadInput for what cannot be."""
+    """Options for reading the file, for the worker and as command options. Raises BadInput for impossible choices."""
     if not time and not rate:
         raise BadInput("time", "no column and no rate", "a column, or a rate in Hz", "Choose the column that holds the time, or give the rate.")
     names = [one.axis for one in axes]
@@ -68,7 +68,7 @@ def reading_of(time: str, rate: float | None, axes: Sequence[AxisColumns], usual
 
 
 def guesses(found: Listing) -> tuple[str, list[AxisColumns]]:
-    """(time, columns of each axis) as the file is read without being told; what is not known is empty."""
+    """(time, columns of each axis) as the file would be read without options; unknown columns are empty."""
     roles = {one.role: one.name for one in found.columns if one.role}
     axes = list(dict.fromkeys(role.rpartition(".")[0] for role in roles if "." in role)) or ["x"]
     clock = next((one.name for one in found.columns if one.looks.startswith("a clock")), "")
@@ -82,12 +82,12 @@ def guesses(found: Listing) -> tuple[str, list[AxisColumns]]:
 
 
 def usable(found: Listing) -> list[str]:
-    """Columns of numbers."""
+    """Names of numeric columns."""
     return [one.name for one in found.columns if one.looks not in ("words", "no numbers")]
 
 
 async def columns_dialog(session: Session, name: str) -> None:
-    """Show what is in a table of the shelf, let the user say what is what, and open it."""
+    """Show the columns of a table on the shelf, let the user assign them, and open the table."""
     waiting = ui.notification(f"Reading the columns of {name} ...", spinner=True, timeout=None)
     try:
         found: Listing | None = await beside(session, lambda: run.io_bound(_listed, session.shelf.find(name)))
@@ -134,7 +134,7 @@ class ColumnsDialog:
         return ui.select([NONE, *self._names], value=chosen, label=role).props(f'outlined dense data-pick="{role}"').classes("pick")
 
     async def _more(self, event: ValueChangeEventArguments[Any]) -> None:
-        """Columns of another file of the shelf can be chosen, too."""
+        """Offer the columns of another file on the shelf, too."""
         other = str(event.value)
         found: Listing | None = await beside(self._session, lambda: run.io_bound(_listed, self._session.shelf.find(other)))
         if found is None:

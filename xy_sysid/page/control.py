@@ -1,4 +1,4 @@
-"""The machine's card: who is there, configure, activate and STOP, what is heard, excitation settings, and record to a bag."""
+"""The machine's card: nodes, configure, activate and STOP, received data, excitation settings, and recording to a bag."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ STATES = {
 
 
 def on_activate(held: bool, others: str) -> tuple[str, str]:
-    """What the button to activate says, and what STOP asks for; the second is empty while STOP is off. others: who holds it but the page."""
+    """(label of the Activate button, question about STOP); the question is empty while STOP is off. others: other nodes that hold STOP."""
     if held and others:
         return "Override STOP", f"STOP is on from {others}. Release it there, or override it here"
     return ("Release STOP and activate", "STOP is on. Activate releases it first") if held else ("Activate", "")
 
 
 class Control:
-    """The machine in one browser."""
+    """The machine's card in one browser."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -57,7 +57,7 @@ class Control:
                 self._bag()
 
     def refresh(self, axes: tuple[str, ...], begun: bool) -> bool:
-        """Show what is now; whether a button here is the next to be pressed. begun: there is a story, which comes first."""
+        """Update the card; returns True if the next action is a button here. begun: there is a story, whose actions have priority."""
         session = self._session
         heard, now = session.heard, time.monotonic()
         activate, stop = on_activate(heard.values("excitation").get("stop") == "on", heard.stopped_by_others())
@@ -103,13 +103,13 @@ class Control:
         return waits
 
     def pace(self) -> str:
-        """How much faster than a real machine the simulated one runs, in words; empty where it does not."""
+        """How much faster than real time the simulated machine runs, in words; empty for a real machine."""
         if self._speed == 1.0 or not self._speed or "ballscrew" not in self._session.heard.present:
             return ""
         return f" · simulated, {self._speed:g} times faster than real time" if self._speed > 0 else " · simulated, at full speed"
 
     def _paced(self, values: dict[str, object]) -> None:
-        """Called in the link's thread; what is shown reads it later."""
+        """Store the values; called in the link's thread, read later by ``refresh``."""
         speed = values.get("speed")
         if isinstance(speed, float):
             self._speed = speed if speed else -1.0
@@ -143,7 +143,7 @@ class Control:
             session.link.transition(label, told)
 
     def _ask_activate(self) -> None:
-        """A real machine moves: ask once more. A simulated one may go at once. The STOP of somebody else is overridden by name only."""
+        """Ask for confirmation if a real machine will move; a simulated one starts at once. Override another node's STOP only if confirmed."""
         held = self._session.heard.stopped_by_others()
         if held:
             self._ask_override(held)
@@ -152,7 +152,7 @@ class Control:
         will_move.ask(self._session, words, "Activate", "sure", lambda: self._go("activate"))
 
     def _ask_override(self, held: str) -> None:
-        """The excitation is asked twice once the user has seen the names: it names whom a second call would override, and then overrides them."""
+        """Activate twice after the user has seen the names: the first call lists the nodes that hold STOP, the second overrides them."""
         session = self._session
 
         def ask(then: Callable[[bool, str], None]) -> None:

@@ -1,4 +1,4 @@
-"""Do two single-axis models suffice? The verdict on two axes that were driven at once: of the machine as it runs, or of a recording when asked."""
+"""Whether two single-axis models suffice: the verdict on two axes driven at the same time, live or on request for a recording."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TWO = 2
 
 
 class CouplingCard:
-    """One source in one browser; shown for two axes and more."""
+    """The card of one source in one browser; shown for two or more axes."""
 
     def __init__(self, session: Session, source: Source) -> None:
         self._session, self._source = session, source
@@ -38,7 +38,7 @@ class CouplingCard:
             self._plot = Plot(CAPTION, "coupling", 320)
 
     async def refresh(self) -> None:
-        """Draw again what has changed."""
+        """Redraw what has changed."""
         source = self._source
         axes = source.axes()
         if source.live:
@@ -46,14 +46,14 @@ class CouplingCard:
         self._card.set_visibility(len(axes) >= TWO)
         self._buttons.set_visibility(not source.live)
         self._words.set_text(self._found.get("sentence", "Does the drive of one axis move the other, too? Needs both axes driven at once."))
-        self._plot.root.set_visibility(source.live or bool(self._found))  # of the machine its place is kept: the verdict comes by itself
+        self._plot.root.set_visibility(source.live or bool(self._found))  # for the machine, keep the space: the verdict arrives by itself
         if self._found:
             edges, least, most = (np.asarray(self._found[name], dtype=np.float64) for name in ("band_edges", "coupling", "at_most"))
             await self._plot.show(self._session, ("coupling", source.key, self._count), bands_figure, self._found["axes"], edges, least, most)
             self._plot.say(f"{self._found['sentence']} {CAPTION}")
 
     def _hear(self, axes: tuple[str, ...]) -> None:
-        """What the identifier says, as the command would."""
+        """Show the identifier's result in the words of the command."""
         said, bands = self._session.heard.coupling()
         table = columns(bands) if bands is not None else {}
         if not said or not table or len(axes) < TWO:
@@ -79,5 +79,5 @@ class CouplingCard:
 
 
 def coupling_text(path: Path, words: tuple[str, ...]) -> str:
-    """What ``xy-sysid coupling --json`` says of a recording that is read so. Raises BadInput with what it says."""
+    """The output of ``xy-sysid coupling --json`` for a recording with these reading options. Raises BadInput with the command's error."""
     return asked(("coupling", str(path), *words, "--json"), ("coupling", "not told", "two axes that were driven at once"))

@@ -1,4 +1,4 @@
-"""A story document in the words of the page. Pure."""
+"""A story document in the words of the page. Pure functions."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ Document = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One candidate."""
+    """One candidate of the table."""
 
     effect: str
     evidence: str
 
 
 def verdict_words(document: Document) -> str:
-    """What the diagnosis of the rigid model said, and how sure it was."""
+    """The result of the diagnosis of the rigid model, with its confidence."""
     return spaced(f"{document.get('sentence') or ''} {confidence(document)}").strip()
 
 
 def model_effects(document: Document) -> list[str]:
-    """Effects in the newest model, in the order in which they came."""
+    """Effects in the newest model, in the order of their addition."""
     ladder = document.get("ladder") or []
     return [str(name) for name in ladder[-1].get("effects", [])] if ladder else []
 
 
 def candidate_rows(document: Document, most: int = 8) -> list[Row]:
-    """What was tried, best first, with its evidence."""
+    """The tested candidates, best first, with their evidence."""
     return [Row(str(item["effect"]), spaced(str(item["evidence"]))) for item in (document.get("candidates") or [])[:most]]
 
 
@@ -52,7 +52,7 @@ def look_alike_lines(document: Document) -> list[str]:
 
 
 def ladder_words(document: Document) -> str:
-    """The staircase for who cannot see it."""
+    """The errors of all steps in words, for screen readers."""
     unit = str(document["error"]["unit"])
     rungs = [f"{str(rung['label']).replace('_', ' ')} {quantity(rung['held_out_error'], unit, 3)}" for rung in document.get("ladder") or []]
     floor = f"; noise floor {quantity(document['ladder'][-1]['noise_floor'], unit, 3)}" if rungs else ""
@@ -60,7 +60,7 @@ def ladder_words(document: Document) -> str:
 
 
 def step_names(document: Document) -> dict[int, str]:
-    """Steps that have pictures, by their place."""
+    """Steps that have figures: index -> name."""
     return {k: f"{k}: {str(step['label']).replace('_', ' ')}" for k, step in enumerate(document.get("steps") or []) if step.get("pictures")}
 
 
@@ -69,5 +69,5 @@ def _named(name: str, sentence: str) -> str:
 
 
 def spaced(sentence: str) -> str:
-    """Names of effects as people write them: coulomb friction."""
+    """The text with names of effects written with spaces: coulomb friction."""
     return re.sub(r"(?<=[a-z])_(?=[a-z])", " ", sentence).replace("->", "→")

@@ -1,4 +1,4 @@
-"""Downloads: the model, the story, the report. Content goes to the browser; no path comes from it."""
+"""Downloads: the model, the story, the report. The browser receives content and never sends a path."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Downloads:
         ui.label("To save a figure or its numbers, use the SVG, PNG and CSV buttons below it.").classes("soft small")
 
     def take(self, kind: str) -> None:
-        """The newest models of all axes, or the story of the axis that is shown."""
+        """Download the newest models of all axes, or the story of the selected axis."""
         source, axis = self._source, self._axis()
         documents = {name: source.document(name) for name in source.axes()}
         found = {name: document for name, document in documents.items() if document}
@@ -55,7 +55,7 @@ class Downloads:
 
 
 def report_text(path: Path, reading: Reading) -> str:
-    """The report of a recording that is read so, as ``xy-sysid report`` writes it; raises BadInput with what it says. Takes a while."""
+    """The report of a recording with these reading options, as ``xy-sysid report`` writes it. Raises BadInput with its error. Takes seconds."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "report.html"
         asked(("report", str(path), "-o", str(out), *reading.words), ("report", "not written", "a recording with a usable axis"))
@@ -63,5 +63,5 @@ def report_text(path: Path, reading: Reading) -> str:
 
 
 def plain_name(title: str) -> str:
-    """A file's name out of a title."""
+    """A file name made from a title."""
     return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in title)[:60] or "axis"

@@ -1,4 +1,4 @@
-"""The numbers of an axis in display units, each with its meaning and good values. Only words; nothing is drawn here."""
+"""The numbers of an axis in display units, each with its meaning and good values. Text only; draws nothing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from xy_sysid.samples.block import FloatArray
 Values = Mapping[str, str]
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 ENOUGH = 12  # windows
-LIGHT = 0.4  # damping above which a pair is no resonance to speak of
+LIGHT = 0.4  # damping ratio above which a pair is not called a resonance
 GOOD_ERROR, POOR_ERROR = 0.02, 0.05
 
 
@@ -27,7 +27,7 @@ GOOD_ERROR, POOR_ERROR = 0.02, 0.05
 class Fact:
     """One number: label, text with unit, what it means.
 
-    good: True, False, or None where there is no good or bad; sure: False where the model fails, so that its interval says nothing
+    good: True, False, or None where there is no good or bad; sure: False where the model fails, so that its interval is not valid
     """
 
     label: str
@@ -55,13 +55,13 @@ MEANINGS = {
     "noise floor": "The error of a perfect model: encoder noise and a tolerance of 0.1 % of the motion.",
 }
 UNSURE = " The model fails: the interval includes noise only and is too narrow."
-NEIGHBOURS = 5  # lines of which the middle one counts, so that one line alone is not the worst
-WORTH = 2.0  # times the noise floor from which a model fails
+NEIGHBOURS = 5  # lines whose median counts, so that one outlier is not reported as the worst
+WORTH = 2.0  # multiple of the noise floor from which a model fails
 ESTIMATES = ("delay", "gain", "antiresonance_1.frequency", "resonance_1.frequency")
 
 
 def facts(values: Values, response: ArrayMessage | None = None, fails: bool = False) -> list[Fact]:
-    """What the identifier's status of an axis says; response: its ``frf`` message, for the coherence; fails: its model does, somewhere."""
+    """Facts of the identifier's status of an axis; response: its ``frf`` message, for the coherence; fails: True if its model fails in any band."""
     found: list[Fact] = []
     for name in ESTIMATES:
         key = next((k for k in values if k.startswith(f"{name} (")), None)
@@ -87,7 +87,7 @@ def facts(values: Values, response: ArrayMessage | None = None, fails: bool = Fa
 
 
 def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fact]:
-    """The numbers of a step of a story (None: the newest): how far it is from the floor and where, then its parameters."""
+    """The numbers of a story's step (None: the newest): the error relative to the noise floor, the worst place, then the parameters."""
     last = document["ladder"][-1 if step is None else step]
     unit = str(document["error"]["unit"])
     held, floor = float(last["held_out_error"]), float(last["noise_floor"])
@@ -123,7 +123,7 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
 
 
 def base_fails(document: Mapping[str, Any] | None) -> str:
-    """The error of the rigid model of a story where it fails; empty if it does not, or if that is unknown."""
+    """The error of the rigid model if it fails; empty if it does not fail or this is unknown."""
     if document is None or not document["ladder"]:
         return ""
     base = document["ladder"][0]
@@ -135,7 +135,7 @@ def base_fails(document: Mapping[str, Any] | None) -> str:
 
 
 def coherence_fact(frequency: FloatArray, coherence: FloatArray) -> Fact:
-    """The lowest coherence and where it is; of a few neighbours the middle one counts."""
+    """The lowest coherence and its frequency, after a running median over a few lines."""
     around = np.lib.stride_tricks.sliding_window_view(coherence, min(NEIGHBOURS, coherence.size))
     smooth = np.median(around, axis=1)
     at = int(np.argmin(smooth))
@@ -144,7 +144,7 @@ def coherence_fact(frequency: FloatArray, coherence: FloatArray) -> Fact:
 
 
 def dropped_words(values: Values) -> str:
-    """Number and reasons; empty while nothing is known."""
+    """Number of dropped samples with reasons; empty while nothing is known."""
     if "dropped windows" not in values:
         return ""
     reasons = [f"{_reason(key)} {values[key]}" for key in values if key.startswith("dropped windows: ") and values[key] != "0"]
@@ -182,7 +182,7 @@ def _within(value: float, good: float, poor: float) -> bool | None:
 
 
 def parameter_rows(parameters: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """Name and value with interval of fitted parameters, of a document's ``parameters``."""
+    """(name, value with interval) of the fitted parameters in a document's ``parameters``."""
     rows = []
     for name, item in parameters.items():
         value, unit, span = item.get("value"), str(item.get("unit") or ""), item.get("ci95") or (None, None)
@@ -197,7 +197,7 @@ def parameter_rows(parameters: Mapping[str, Mapping[str, Any]]) -> list[tuple[st
 
 
 def transfer_function_html(numerator: FloatArray, denominator: FloatArray, delay: float) -> str:
-    """H(s) = N(s)/D(s) exp(-s delay) as HTML, D monic or not, in units of output over input."""
+    """H(s) = N(s)/D(s) exp(-s delay) as HTML, in units of output over input; D need not be monic."""
     top, bottom = escape(polynomial(numerator)), escape(polynomial(denominator))
     late = f"<span>e<sup>−<i>s</i> · {escape(quantity(delay, 's', 4))}</sup></span>" if delay else ""
     whole = f'<span class="frac"><span>{top}</span><span>{bottom}</span></span>'
@@ -205,7 +205,7 @@ def transfer_function_html(numerator: FloatArray, denominator: FloatArray, delay
 
 
 def polynomial(coefficients: FloatArray) -> str:
-    """Falling powers of s: s⁴ + 3.2 s³ − 1."""
+    """A polynomial in falling powers of s: s⁴ + 3.2 s³ − 1."""
     parts: list[str] = []
     order = len(coefficients) - 1
     for place, value in enumerate(coefficients):
@@ -220,7 +220,7 @@ def polynomial(coefficients: FloatArray) -> str:
 
 
 def seconds_text(seconds: float) -> str:
-    """7 s, 3 min 20 s, 1 h 2 min."""
+    """A duration as text: 7 s, 3 min 20 s, 1 h 2 min."""
     whole = round(seconds)
     if whole < 100:
         return f"{whole} s"

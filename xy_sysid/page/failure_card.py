@@ -1,4 +1,4 @@
-"""The first picture of an axis: where the model that is shown fails, by frequency, speed, position and time, on one scale."""
+"""The first figure of an axis: where the selected model fails, by frequency, speed, position and time, on one scale."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class FailureCard:
                     self.plots[by] = Plot(READING[by], f"fails_by_{by}", HEIGHT)
 
     async def refresh(self, axis: str, view: View) -> None:
-        """Draw again what has changed."""
-        stamp = self._source.stamp(axis)  # before the document: see StoryCard
+        """Redraw what has changed."""
+        stamp = self._source.stamp(axis)  # read before the document: see StoryCard
         document = self._source.document(axis)
         self._card.set_visibility(not view.linear)
         if view.linear:
@@ -47,6 +47,6 @@ class FailureCard:
             return
         key = self._source.key, axis, stamp, view.step, "fails"
         shows = [plot.show(self._session, (*key, by), partial(failure, by=by), document, step=view.step) for by, plot in self.plots.items()]
-        await asyncio.gather(*shows)  # together: no picture of one step stands beside one of another for long
+        await asyncio.gather(*shows)  # all at once, so that plots of different steps are never shown together for long
         for by, plot in self.plots.items():
             plot.say(failure_words(document, by, view.step))

@@ -1,4 +1,4 @@
-"""What a field shows is what counts: it goes with the press of a button, as text typed while the connection was away never reached the server."""
+"""The browser sends the text of typed fields with each button press, because text typed while it was offline never reached the server."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ SHOWN = "() => emit(Object.fromEntries([...document.querySelectorAll('input[data
 
 
 def typed(field: F) -> F:
-    """The same field, whose text goes with every press of ``on_press``."""
+    """Mark the field so that its text is sent with every press of ``on_press``; returns the same field."""
     field.props(f"data-typed={field.id}")
     return field
 
 
 def on_press(button: ui.button, fields: Callable[[], Iterable[Any]], act: Callable[[], object]) -> None:
-    """Do something at a press of a button, when those of the fields that are ``typed`` have the values that the browser shows in them."""
+    """Call ``act`` when the button is pressed, after the ``typed`` fields have received the values that the browser shows."""
 
     def pressed(event: GenericEventArguments) -> None:
         take_over(fields(), event.args)
@@ -29,7 +29,7 @@ def on_press(button: ui.button, fields: Callable[[], Iterable[Any]], act: Callab
 
 
 def take_over(fields: Iterable[Any], shown: Mapping[str, str]) -> None:
-    """shown: text of typed fields, by their number."""
+    """Copy the browser's values to the fields. shown: text of typed fields, by number."""
     for field in fields:
         text = shown.get(str(field.id))
         if text is not None:

@@ -1,4 +1,4 @@
-"""Choose a recording of the shelf; the browser sends a name, never a path."""
+"""Dialog to choose a recording of the shelf; the browser sends a name, never a path."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from xy_sysid.page.shelf import TEXTS
 
 
 async def open_dialog(session: Session) -> None:
-    """Let the user choose, and open it beside the others."""
+    """Let the user choose a recording, and open it in addition to the open ones."""
     names = await run.io_bound(session.shelf.names) or await run.io_bound(session.shelf.names, texts=True)
     with ui.dialog() as dialog, ui.element("div").classes("card").style("min-width: min(90vw, 420px)"):
         ui.html("<h2>Open a recording</h2>", sanitize=False)
@@ -35,7 +35,7 @@ async def open_dialog(session: Session) -> None:
 
 
 async def _columns(session: Session, name: str, dialog: ui.dialog) -> None:
-    with ui.context.client.content:  # beside this dialog, not in it: it goes when it is closed
+    with ui.context.client.content:  # outside this dialog, which is deleted when it closes
         dialog.close()
         await columns_dialog(session, name)
 

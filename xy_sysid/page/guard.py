@@ -1,4 +1,4 @@
-"""Applies the rules of ``access`` before the application, for HTTP and WebSocket."""
+"""Applies the rules of ``access`` to HTTP and WebSocket before the application sees a request."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from xy_sysid.page.access import HEADERS, LARGEST, Access, Answer, judge, set_co
 
 PAGE = "<!DOCTYPE html><html lang=en><meta charset=utf-8><title>xy_sysid</title><body style='font-family:sans-serif'><h1>xy_sysid</h1><p>{}</p>"
 NONSENSE = 1003  # close code for data that cannot be understood
-TALK = "/_nicegui_ws/"  # where pages talk with their server
-GONE = ("http.disconnect", "websocket.disconnect")  # who asked has gone before anybody listened: the application cannot bear that
-REFUSED = 4403  # close code of a WebSocket that is not let in
+TALK = "/_nicegui_ws/"  # path of the pages' WebSocket connection
+GONE = ("http.disconnect", "websocket.disconnect")  # the client disconnected before the request was handled: the application fails on such a request
+REFUSED = 4403  # close code of a refused WebSocket
 
 
 class Guard:
-    """ASGI middleware."""
+    """ASGI middleware that accepts or refuses requests."""
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app, self._access = app, access
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let it through with some headers of care, or refuse it."""
+        """Pass the request on with security headers, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -34,7 +34,7 @@ class Guard:
         answer = judge(self._access, headers, scope.get("query_string", b"").decode("latin-1"))
         if answer.status == 200:
             first = await receive()
-            if first["type"] not in GONE or not scope["path"].startswith(TALK):  # a STOP is obeyed, whether or not who sent it is still there
+            if first["type"] not in GONE or not scope["path"].startswith(TALK):  # a STOP is handled even if its sender has disconnected
                 heard = _from(first, receive)
                 await self._answered(scope, (_bounded if scope["type"] == "http" else _understood)(heard), _careful(send))
         elif scope["type"] == "websocket":
@@ -44,7 +44,7 @@ class Guard:
             await _answer(answer, send)
 
     async def _answered(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """What the application says; to a page whose session has ended meanwhile, that it has: it begins another by itself."""
+        """The application's answer. A page whose session has ended gets an error and starts a new session by itself."""
         if not scope["path"].startswith(TALK):
             await self._app(scope, receive, send)
             return
@@ -56,7 +56,7 @@ class Guard:
 
         try:
             await self._app(scope, receive, sending)
-        except* KeyError:  # alone, or in a group of the tasks between
+        except* KeyError:  # raised alone, or in a group from intermediate tasks
             if not told and scope["type"] == "websocket":
                 await send({"type": "websocket.close", "code": NONSENSE})
             elif not told:
@@ -64,7 +64,7 @@ class Guard:
 
 
 def _from(first: Message, receive: Receive) -> Receive:
-    """The message that was looked at, and all that follow."""
+    """A receive function that returns the message already read, then all that follow."""
     waiting = [first]
 
     async def receiving() -> Message:
@@ -74,7 +74,7 @@ def _from(first: Message, receive: Receive) -> Receive:
 
 
 def _bounded(receive: Receive) -> Receive:
-    """What comes without a length ends where it becomes too large, as if the other side had gone."""
+    """Limit a body without a declared length: above the limit, report a disconnect."""
     size = 0
 
     async def receiving() -> Message:
@@ -87,7 +87,7 @@ def _bounded(receive: Receive) -> Receive:
 
 
 def _understood(receive: Receive) -> Receive:
-    """A line that says what no page of ours says has gone: nobody behind it need be able to bear that."""
+    """Report a disconnect for a WebSocket message that our page never sends; the application need not handle it."""
 
     async def receiving() -> Message:
         message = await receive()
@@ -99,7 +99,7 @@ def _understood(receive: Receive) -> Receive:
 
 
 def _packet(said: str) -> bool:
-    """Whether it is a packet of Engine.IO, and of Socket.IO inside; a page of ours says nothing in bytes."""
+    """True for a text packet of Engine.IO, with Socket.IO inside; our page sends no bytes."""
     try:
         outer = engineio.packet.Packet(encoded_packet=said)
         if outer.packet_type == engineio.packet.MESSAGE:

@@ -1,4 +1,4 @@
-"""The page from top to bottom for one browser: bar with STOP, notices, one panel for the machine and for each recording."""
+"""Layout of the page in one browser: bar with STOP, notices, one panel for the machine and one for each recording."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from xy_sysid.page.trend_card import TrendCard
 from xy_sysid.page.units_choice import UnitsChoice
 from xy_sysid.units import shown_in
 
-EVERY = 0.4  # s between two looks for what is new
-THEMES, DARK = ("", "light", "dark"), (None, False, True)  # in the address, and for the page
+EVERY = 0.4  # s between two updates
+THEMES, DARK = ("", "light", "dark"), (None, False, True)  # theme names in the address, and the corresponding values for NiceGUI
 
 
 def build(session: Session, view: PageView) -> None:
-    """Everything as the address asks for it; then look for news for as long as the browser is there."""
+    """Build the page as the address describes it; update it until the browser disconnects."""
     page = Page(session, view)
     ui.timer(EVERY, page.refresh)
 
@@ -42,7 +42,7 @@ class Page:
             self._alarm = ui.element("div").classes("notices").props("role=alert")
             self._notices = ui.element("div").classes("notices").props("role=status aria-live=polite")
             self._empty = ui.element("div").classes("card")
-            self._empty.set_visibility(False)  # until it is known that there is nothing
+            self._empty.set_visibility(False)  # until it is known that there are no sources
             with self._empty:
                 ui.label("No recording is open. Open one from the folder in which the page was started.")
                 with ui.element("div").classes("buttons"):
@@ -53,7 +53,7 @@ class Page:
         ui.skip_link("to the pictures", target=main)
 
     async def refresh(self) -> None:
-        """Draw what has changed, in the units that this browser has chosen."""
+        """Redraw what has changed, in this browser's units."""
         with shown_in(self._units.chosen):
             await self._refresh()
 
@@ -71,16 +71,16 @@ class Page:
         self._empty.set_visibility(not sources)
         self._units.refresh(sources)
         self._tell(sources)
-        compared = choices(sources)  # before the panels are drawn: what they do not show yet would push this card down later
+        compared = choices(sources)  # before the panels are drawn: a panel that grows later would move this card
         for panel in list(self._panels.values()):
-            if not self._client.is_deleted:  # the browser may go while something is drawn
+            if not self._client.is_deleted:  # the browser may disconnect during the update
                 await panel.refresh()
         if not self._client.is_deleted:
             self._keep_address()
             await self._together.refresh(compared)
 
     def _keep_address(self) -> None:
-        """The address of the browser names what is shown, so that a reload or a link shows it again."""
+        """Write the current view to the browser's address, so that a reload or a link restores it."""
         view = PageView(tuple(panel.view() for panel in self._panels.values()), THEMES[self._theme.value], self._units.chosen)
         query = query_of(view)
         if query != self._query:
@@ -106,7 +106,7 @@ class Page:
                 stop.on("click", js_handler="() => window.xyStop()")
 
     def _tell(self, sources: list[Source]) -> None:
-        """The bar's line, alarms, and the newest messages."""
+        """Show the bar's line, alarms, and the newest messages."""
         session = self._session
         self._state.set_text(state_words(session, sources))
         alarms = session.heard.alarms()

@@ -1,7 +1,7 @@
-"""The page's own ROS 2 node: it hears results and stories and passes orders on. If it fails, it is restarted.
+"""The page's own ROS 2 node: it receives results and stories and sends orders. It is restarted if it fails.
 
-The node lives in a thread of its own (``_Line``). ``Link`` looks after it, and stands when it falls: STOP has a wire of its own
-and is published from the thread that asks for it, and every order goes to the node that is there then.
+The node runs in its own thread (``_Line``). ``Link`` supervises it and survives its failure. STOP has its own publisher and is
+published from the caller's thread; every other order goes to the node that is then alive.
 """
 
 from __future__ import annotations
@@ -35,27 +35,27 @@ from xy_sysid.nodes.convert import array_from_ros
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.page.topics_state import COUPLING, TopicsState
 
-WATCHERS = ("page", "demo", "settle")  # nodes of the page and of commands, which come and go
-STOPS = "page_stop"  # how the nodes by which pages publish STOP begin
-LOOK = 0.5  # s between two looks at the graph and the lifecycle
+WATCHERS = ("page", "demo", "settle")  # nodes of the page and of commands; they start and stop often
+STOPS = "page_stop"  # name prefix of the nodes with which pages publish STOP
+LOOK = 0.5  # s between two polls of the graph and the lifecycle
 PATIENCE = 5.0  # s for an answer of a node
-AGAIN = 2  # times that parameters are asked for or set once more without an answer
+AGAIN = 2  # retries of a parameter request without an answer
 TABLES = ("frf", "transfer_function", "comparison", COUPLING)
 STOP_AGAIN = 0.5  # s after which STOP is sent again if it is not confirmed
-STOP_LOOK = 0.05  # s between two looks whether the excitation has said that it stands
+STOP_LOOK = 0.05  # s between two checks that the excitation has confirmed STOP
 STOP_GIVES_UP = 6.0  # s
 AT_REST = ("inactive", "unconfigured", "finalized")
-WATCH = 0.2  # s between two looks whether the link's thread lives
-STUCK = 3.0  # s without a turn of its loop after which it counts as dead
+WATCH = 0.2  # s between two checks that the link's thread is alive
+STUCK = 3.0  # s without an iteration of its loop after which the thread counts as dead
 
-Told = Callable[[bool, str], None]  # whether an order was done, and the node's sentence
+Told = Callable[[bool, str], None]  # receives whether an order succeeded, and the node's sentence
 
 
 @dataclass(frozen=True, slots=True)
 class _Question:
-    """A call of a service: its type and name, what is asked, and how the answer is read: whether it was done, and the node's sentence.
+    """A service call: its type, name and request, and a function that reads the answer: success, and the node's sentence.
 
-    again: how often it is asked once more if no answer comes, as a computer under load loses some; of what may be done twice only
+    again: retries if no answer arrives, because a loaded computer loses some; only for calls that may safely run twice
     """
 
     kind: Any
@@ -67,7 +67,7 @@ class _Question:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Asked:
-    """A question that was asked, for how many s and until when an answer is waited for, and the future that brings it."""
+    """A pending call: its timeout in s, its deadline, and the future of its answer."""
 
     question: _Question
     told: Told
@@ -77,17 +77,17 @@ class _Asked:
 
     @property
     def node(self) -> str:
-        """Whom."""
+        """The name of the called node."""
         return self.question.service.partition("/")[0]
 
 
 class Link:
-    """Everything between the page and the nodes. Orders return at once; ``told`` is called later, in the link's thread."""
+    """The connection between the page and the nodes. Orders return at once; ``told`` is called later, in the link's thread."""
 
     def __init__(self, heard: TopicsState, namespace: str = NAMESPACE, say: Callable[[str], None] = lambda words: None) -> None:
-        """say: takes what people must know of the link itself."""
+        """say: receives messages for users about the link itself."""
         self.heard = heard
-        self.problem = ""  # why nothing is heard; empty while the link stands
+        self.problem = ""  # why nothing is received; empty while the link works
         self._namespace, self._say = namespace, say
         self._orders: queue.SimpleQueue[Callable[[_Line], None]] = queue.SimpleQueue()
         self._ended = threading.Event()
@@ -98,7 +98,7 @@ class Link:
         self._watch.start()
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Remove the node from the graph."""
         self._ended.set()
         self._watch.join(3.0)
         self._line.close()
@@ -107,7 +107,7 @@ class Link:
     # orders, from any thread
 
     def transition(self, label: str, told: Told) -> None:
-        """configure, activate, deactivate or cleanup the excitation; activate releases a STOP."""
+        """configure, activate, deactivate or clean up the excitation; activate also releases STOP."""
         if label == "activate":
             self._wire.put(False)
         request = ChangeState.Request(transition=Transition(label=label))
@@ -121,18 +121,18 @@ class Link:
         ask(once_more)
 
     def stop(self, told: Told) -> None:
-        """Zero volts by two ways, the topic and the service; told when the excitation's state confirms it, or that it never did."""
+        """Command zero volts by topic and by service; ``told`` reports the excitation's confirmation, or that there was none."""
         stop = _Stop(time.monotonic(), told)
         self._wire.put(True)
         self._orders.put(lambda line: line.stop(stop))
 
     def trigger(self, service: str, told: Told, patience: float = PATIENCE) -> None:
-        """A service without arguments, such as identifier/reset; patience: s that it may take."""
+        """Call a service without arguments, such as identifier/reset; patience: timeout in s."""
         question = _Question(Trigger, service, Trigger.Request(), lambda a: (a.success, a.message))
         self._orders.put(lambda line: line.call(question, told, patience))
 
     def set_parameters(self, node: str, values: dict[str, Any], told: Told) -> None:
-        """Change parameters of a node; all or the sentence of the first that was refused."""
+        """Change parameters of a node; ``told`` reports success, or the reason for the first refused one."""
 
         def order(line: _Line) -> None:
             kind: Any = Parameter
@@ -142,7 +142,7 @@ class Link:
         self._orders.put(order)
 
     def get_parameters(self, node: str, names: list[str], give: Callable[[dict[str, Any]], None], told: Told) -> None:
-        """The values of parameters as the node has them now."""
+        """Read the node's current parameter values; ``give`` receives them."""
 
         def read(answer: Any) -> tuple[bool, str]:
             give({name: parameter_value_to_python(value) for name, value in zip(names, answer.values, strict=False)})
@@ -173,9 +173,9 @@ class Link:
 
 
 class _StopWire:
-    """The topic of STOP: a node that only publishes, needs no thread, and shares nothing with the link that may die.
+    """The publisher of STOP: a node that needs no thread and is independent of the link, which may fail.
 
-    name: of this server alone, so that the STOP of another page is never taken for its own.
+    name: unique to this server, so that it never takes another page's STOP for its own.
     """
 
     def __init__(self, namespace: str) -> None:
@@ -186,18 +186,18 @@ class _StopWire:
         self._topic = self._node.create_publisher(Bool, STOP_TOPIC, LATCHED_QOS)
 
     def put(self, on: bool) -> None:
-        """STOP, or its release; latched."""
+        """Publish STOP, or its release; latched."""
         self._topic.publish(Bool(data=on))
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Remove the node from the graph."""
         self._node.destroy_node()
         self._context.try_shutdown()
 
 
 @dataclass
 class _Stop:
-    """A STOP under way. begun, asked: s, when it was wished and when the service was called last."""
+    """A STOP in progress. begun, asked: s, time of the request and of the latest service call."""
 
     begun: float
     told: Told
@@ -205,14 +205,14 @@ class _Stop:
     over: bool = False
 
     def confirm(self, state: str) -> None:
-        """The excitation is at rest."""
+        """Report that the excitation is at rest."""
         if not self.over:
             self.over = True
             self.told(True, f"stopped: the excitation is {state}, the voltage is zero")
 
 
 class _Line:
-    """One node in one thread; it can die, and then another takes its place."""
+    """One node in one thread; if it dies, ``Link`` replaces it."""
 
     def __init__(self, heard: TopicsState, namespace: str, orders: queue.SimpleQueue[Callable[[_Line], None]], say: Callable[[str], None]) -> None:
         self.heard = heard
@@ -235,19 +235,19 @@ class _Line:
         self._thread.start()
 
     def dead(self) -> str:
-        """Why it does not work any more; empty while it does."""
+        """Why the node has stopped working; empty while it works."""
         if not self._thread.is_alive():
             return self.wall.told or "its thread has ended"
         silent = time.monotonic() - self.beat
         return f"it has not responded for {silent:.0f} s" if silent > STUCK else ""
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Remove the node from the graph."""
         self._ended.set()
         self._thread.join(3.0)
 
     def abandon(self) -> None:
-        """Give it up, and inform the caller that waits for an answer."""
+        """Give up this node, and inform callers that wait for an answer."""
         self._ended.set()
         for asked in self._waiting:
             if not self._once_more(asked):
@@ -255,7 +255,7 @@ class _Line:
         self._waiting.clear()
 
     def call(self, question: _Question, told: Told, patience: float = PATIENCE, since: float = 0.0) -> None:
-        """Call a service, once it is there; told the answer, or that there is none."""
+        """Call a service as soon as it is available; ``told`` receives the answer, or that there is none."""
         client, since = self._client(question.kind, question.service), since or time.monotonic()
         if not client.service_is_ready():
             if time.monotonic() - since > 2.0:
@@ -275,9 +275,9 @@ class _Line:
         future.add_done_callback(self.wall.around(done))
 
     def stop(self, stop: _Stop) -> None:
-        """Ask for deactivation, look at the state, and again until it is seen to be at rest."""
+        """Request deactivation and check the state; repeat until the excitation is at rest."""
         now = time.monotonic()
-        if self.heard.at_rest_since(stop.begun):  # what it says by itself, should its services not answer
+        if self.heard.at_rest_since(stop.begun):  # its status counts if its services do not answer
             stop.confirm("at rest")
         if stop.over:
             return
@@ -303,7 +303,7 @@ class _Line:
     # in its thread
 
     def _spin(self) -> None:
-        """Until it is to end; whatever ends it, the node leaves the graph in the thread that used it."""
+        """Run until closed; in any case remove the node from the graph in the thread that used it."""
         try:
             while not self._ended.is_set() and self._context.ok():
                 self._turn()
@@ -326,7 +326,7 @@ class _Line:
                 asked.told(False, f"{asked.node} did not answer in time")
 
     def _once_more(self, asked: _Asked) -> bool:
-        """Ask again if that may be done, whichever line there is then."""
+        """Repeat the call if that is safe, with the node that is then alive."""
         question = replace(asked.question, again=asked.question.again - 1)
         if question.again < 0:
             return False
@@ -339,7 +339,7 @@ class _Line:
         return self._clients[service]
 
     def _look(self) -> None:
-        """Who is there, which axes they publish, and how the excitation is."""
+        """Update the list of nodes, their axes, and the state of the excitation."""
         space = self._node.get_namespace()
         found = self._node.get_node_names_and_namespaces()
         names = {name for name, where in found if where == space and name not in WATCHERS and not name.startswith(("_", STOPS))}

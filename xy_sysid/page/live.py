@@ -1,4 +1,4 @@
-"""The machine as it runs, as a Source: stories come from the diagnoser, and what is asked for goes to it. Each axis has its own state."""
+"""The running machine as a Source: stories come from the diagnoser, and orders go to it. Each axis has its own state."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from xy_sysid.page.topics_state import TopicsState
 
 NODE = "diagnoser"
 LONG = 600.0  # s that a diagnosis may take
-SETTLES = 3.0  # s after an answer in which the diagnoser begins, or has said what it has done
-LOST = 10.0  # s without an answer and without work of the diagnoser after which it is asked again,
-AGAIN = 2  # times
-ENOUGH = 10.0  # s of data with which the rigid model is fitted unasked, so that the first picture shows where it fails
-NEWER = 1.0  # s of newer data from which they are mentioned
+SETTLES = 3.0  # s after an answer in which the diagnoser starts, or reports what it has done
+LOST = 10.0  # s without an answer and without work of the diagnoser, after which the order is repeated
+AGAIN = 2  # repetitions at most
+ENOUGH = 10.0  # s of data after which the rigid model is fitted automatically, so that the first figure shows where it fails
+NEWER = 1.0  # s of newer data from which the page mentions them
 SERVICES = {"diagnose": "diagnose", "renew": "renew", "next": "add_next", "auto": "auto", "reset": "reset_model"}
 
 
 @dataclass
 class _Asked:
-    """What was asked for of one axis.
+    """An order for one axis.
 
-    before: what the diagnoser had said of the axis then; again: times that it may be asked once more
-    settled: when the order was answered, and what the diagnoser had said then; wanted: parameters that were set
+    before: the diagnoser's report on the axis at the time of the order; again: remaining repetitions
+    settled: time of the answer, and the diagnoser's report then; wanted: parameters that were set
     """
 
     state: OrderState
@@ -43,7 +43,7 @@ class _Asked:
 
 
 class Live:
-    """Topics of one namespace."""
+    """The machine's topics in one namespace, as a Source."""
 
     live = True
     key = "live"
@@ -56,7 +56,7 @@ class Live:
         self._numbers = itertools.count(1)
 
     def axes(self) -> tuple[str, ...]:
-        """Axes of which something was heard."""
+        """Axes from which data were received."""
         return self.heard.axes()
 
     def document(self, axis: str) -> dict[str, Any] | None:
@@ -64,11 +64,11 @@ class Live:
         return self.heard.stories.get(axis)
 
     def stamp(self, axis: str) -> int:
-        """Grows with each story of the axis and each change of what is done for it."""
+        """Counter that grows with each story of the axis and each change of its orders."""
         return self._done(axis) + self._asked
 
     def job(self, axis: str) -> OrderState | None:
-        """What the diagnoser says that it does for the axis, or what it was asked for a moment ago."""
+        """The diagnoser's current work on the axis, or the newest order."""
         words, since = self.heard.doings.get(axis, ("", 0.0))
         if words and NODE in self.heard.present:
             return OrderState(order=Order(0, "diagnose", axis), begun=since, running=words != WAITS, said=words.replace("_", " "))
@@ -83,7 +83,7 @@ class Live:
         return asked.state if asked is not None else None
 
     def _set_again_or_end(self, axis: str, asked: _Asked) -> None:
-        """The effects are set. Where the diagnoser has not begun with them they are set once more, which it does nothing about if it has them."""
+        """Set the effects again if the diagnoser has not started; it ignores effects that it already has. Otherwise end the order."""
         if self._done(axis) != asked.before:
             self._end(axis)
         elif asked.again:
@@ -94,26 +94,26 @@ class Live:
             self._told(axis, False, "the model has these effects already; press Diagnose")
 
     def _look_for_losses(self, axis: str, asked: _Asked) -> None:
-        """The diagnoser is idle and has not answered: either the answer was lost, or the question, as on a computer under load."""
+        """Repeat an order if the diagnoser is idle and has not answered: a loaded computer can lose a request or an answer."""
         waited = time.monotonic() - asked.state.begun
-        if waited > LOST and self._done(axis) != asked.before:  # it has worked: never asked for twice
+        if waited > LOST and self._done(axis) != asked.before:  # it has worked on the order: do not repeat it
             self._end(axis)
         elif asked.again and waited > LOST * (AGAIN + 1 - asked.again):
             asked.again -= 1
             self._trigger(asked.state.order)
 
     def begin(self) -> None:
-        """Have the rigid model fitted once there are enough data, if no other work was requested."""
+        """Start the fit of the rigid model once there are enough data, if no other work was requested."""
         if not self.heard.stories and NODE in self.heard.present and self._kept() >= self._enough:
             self._enough = 2.0 * self._kept()
             self.link.trigger(f"{NODE}/begin", lambda done, words: None, LONG)
 
     def ready(self, axis: str) -> bool:
-        """Whether something can be asked for: the diagnoser is there, and it has a story of the axis, or data for one."""
+        """True if an order is possible: the diagnoser runs, and has a story or enough data of the axis."""
         return NODE in self.heard.present and (axis in self.heard.stories or self._kept() >= ENOUGH)
 
     def words(self, axis: str) -> str:
-        """What is waited for before there is a story, and how long."""
+        """What the page waits for before there is a story, and for how long."""
         if NODE not in self.heard.present:
             return "The diagnoser does not answer. Start it with xy-sysid run, or record a bag and open it here."
         kept = self._kept()
@@ -125,7 +125,7 @@ class Live:
         return f"{ENOUGH:.0f} s of data have arrived. The rigid model is being fitted, which takes a few seconds."
 
     def used(self, axis: str) -> str:
-        """The seconds that the story is about, since the samples began to be heard, and how many are newer."""
+        """The time range of the story's data in s since the first sample, and the amount of newer data."""
         values = self.heard.values(NODE)
         document = self.document(axis)
         if document is None:
@@ -138,25 +138,25 @@ class Live:
         return f"Fitted to seconds {ends[0]:.0f} to {ends[1]:.0f} of the data. {more}"
 
     def awaits(self, axis: str) -> bool:
-        """Whether the diagnoser is there, or may still be seen: until the identifier has shown a response."""
+        """True if the diagnoser runs or may still appear: until the identifier has published a response."""
         return NODE in self.heard.present or self.heard.table("frf", axis) is None
 
     def newer(self, axis: str) -> bool:
-        """Whether there are newer data than those of the story."""
+        """True if there are newer data than those of the story."""
         values = self.heard.values(NODE)
         end = _number(values, f"axis {axis} used to (s)")
         return axis in self.heard.stories and not _number(values, "seconds heard (s)") < end + NEWER
 
     def effects(self) -> tuple[str, ...]:
-        """The library; what the diagnoser has besides can be added with its parameter."""
+        """Effects of the library; other effects of the diagnoser can be added with its parameter."""
         return tuple(effect.name for effect in STANDARD.acting)
 
     def problem(self) -> str:
-        """The nodes that are lost are told elsewhere."""
+        """Empty: lost nodes are reported elsewhere."""
         return ""
 
     def ask(self, act: OrderKind, axis: str, argument: str = "") -> None:
-        """Pass it on to the diagnoser."""
+        """Send an order to the diagnoser."""
         asked = _Asked(OrderState(Order(next(self._numbers), act, axis, argument), time.monotonic(), None, True), self._done(axis))
         if act in ("add", "remove"):
             effects = self._effects(axis)
@@ -174,7 +174,7 @@ class Live:
         self._asked += 1
 
     def cancel(self, axis: str) -> None:
-        """Leave what the diagnoser does for the axis."""
+        """Cancel the diagnoser's work on the axis."""
         self.link.trigger(f"{NODE}/{topic_of('cancel', axis)}", lambda done, words: self._told(axis, done, words))
 
     def _trigger(self, order: Order) -> None:
@@ -183,7 +183,7 @@ class Live:
 
     def _told(self, axis: str, done: bool, words: str) -> None:
         self._end(axis)
-        if not done:  # what was done stands in the story
+        if not done:  # on success the story already shows it
             self._say(words or "the diagnoser refused", done)
 
     def _end(self, axis: str) -> None:
@@ -191,7 +191,7 @@ class Live:
         self._asked += 1
 
     def _set(self, axis: str, done: bool, words: str) -> None:
-        """A parameter is set at once; what follows from it begins a moment later."""
+        """Handle the answer to a changed parameter; the diagnoser starts the resulting work a moment later."""
         asked = self._jobs.get(axis)
         if done and not words and asked is not None:
             asked.settled = time.monotonic(), self._news(axis)
@@ -199,11 +199,11 @@ class Live:
             self._told(axis, done, words)
 
     def _news(self, axis: str) -> int:
-        """Grows with each story of the axis."""
+        """Counter that grows with each story of the axis."""
         return self.heard.version.get(f"story {axis}", 0)
 
     def _done(self, axis: str) -> int:
-        """Grows with each story, and with whatever the diagnoser says that it does for the axis."""
+        """Counter that grows with each story and each report of the diagnoser's work on the axis."""
         return self._news(axis) + self.heard.version.get(f"progress {axis}", 0)
 
     def _kept(self) -> float:

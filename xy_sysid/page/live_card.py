@@ -1,4 +1,4 @@
-"""What the identifier publishes, as pictures: its response with where its linear fit fails, and the watched resonance over time."""
+"""Figures of the identifier's results: its response and where its linear fit fails, and the watched resonance over time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from xy_sysid.page.session import Session
 
 
 class LiveCards:
-    """What the identifier publishes."""
+    """The figures of the identifier's results in one browser."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -26,7 +26,7 @@ class LiveCards:
             self._track = Plot("Fitted to the newest windows only. Two fits in a row that differ from the reference raise the alarm.", "resonance")
 
     async def refresh(self, axis: str, shown: bool) -> None:
-        """Draw again what has changed; shown: the linear fit is what is looked at."""
+        """Redraw what has changed; shown: True if the linear fit is selected."""
         heard = self._session.heard
         key = ("live", axis, heard.version.get(f"axis {axis}", 0))
         frf, comparison = heard.table("frf", axis), heard.table("comparison", axis)

@@ -1,4 +1,4 @@
-"""Pictures of what the identifier publishes: its response with model and residual on one axis, and the resonance over time."""
+"""Figures of the identifier's results: its response with model and residual, and the resonance over time."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from xy_sysid.units import USUAL, Units, over, readable
 MOST = 1200  # lines drawn
 LEAST = 0.3  # coherence of a trusted line
 SOLID, DASHED = {"color": MEASURED, "width": 1.8}, {"color": MODEL, "width": 1.8, "dash": "dash"}
-NOTABLE = 4.0  # sigma above which a stretch of lines is shaded
-STRETCH = 3  # neighbouring lines that must be above it
+NOTABLE = 4.0  # standard errors above which a range of lines is shaded
+STRETCH = 3  # number of neighbouring lines that must exceed it
 
 
 def response_figure(
     frf: ArrayMessage, comparison: ArrayMessage | None, tf: TransferFunction | None, sampling_rate: float, units: Units = USUAL
 ) -> go.Figure:
-    """Where the model fails in standard errors, then magnitude and phase with 95 % band, the model over them, and the coherence.
+    """Residual in standard errors, magnitude and phase with 95 % band and model, and coherence.
 
-    sampling_rate: Hz, for the hold of the voltage that the model is seen through; 0 if it is not known
+    sampling_rate: Hz, for the hold that is part of the plotted model; 0 if unknown
     """
     table = columns(frf)
     frequency, coherence = table["frequency"], table["coherence"]
@@ -82,7 +82,7 @@ def response_figure(
 
 
 def failing(comparison: ArrayMessage | None) -> list[tuple[float, float, float]]:
-    """Stretches (from, to, largest residual in sigma) of neighbouring lines where the model fails."""
+    """(from, to, largest residual in sigma) of ranges of neighbouring lines where the model fails."""
     table = columns(comparison) if comparison is not None else {}
     if not table:
         return []
@@ -102,7 +102,7 @@ def failing(comparison: ArrayMessage | None) -> list[tuple[float, float, float]]
 
 
 def failing_words(comparison: ArrayMessage | None) -> str:
-    """The same in a sentence."""
+    """The failing ranges in a sentence."""
     found = failing(comparison)
     if comparison is None:
         return "No model yet."
@@ -113,7 +113,7 @@ def failing_words(comparison: ArrayMessage | None) -> str:
 
 
 def tracking_figure(history: Sequence[Tracked]) -> go.Figure:
-    """The watched resonance over seconds of data, its reference, and where the alarm was on."""
+    """The watched resonance over seconds of data, its reference, and the times of the alarm."""
     figure = rows(1, shared=True, gap=0.0)
     time = np.array([item.seconds for item in history])
     found = np.array([item.frequency for item in history])
@@ -162,7 +162,7 @@ def _untrusted(figure: go.Figure, row: int, x: FloatArray, y: FloatArray, which:
 
 
 def _stretches(trusted: np.ndarray, frequency: FloatArray) -> list[slice]:
-    """Runs of neighbouring trusted lines."""
+    """Slices of consecutive trusted lines."""
     if bool(trusted.all()):
         return unbroken(frequency) if frequency.size > 2 else [slice(0, frequency.size)]
     edges = np.flatnonzero(np.diff(np.concatenate(([0], trusted.astype(np.int8), [0]))))

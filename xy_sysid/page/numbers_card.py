@@ -1,4 +1,4 @@
-"""The card of numbers: the transfer function as mathematics, and each number with what it means."""
+"""The card of numbers: the transfer function as a formula, and each number with its meaning."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AWAITED = ("held-out error", "noise floor", "worst place", "linear part", "gain"
 
 
 class Numbers:
-    """What is known of one axis in figures."""
+    """The numbers of one axis."""
 
     def __init__(self) -> None:
         self._shown: object = None
@@ -30,7 +30,7 @@ class Numbers:
             self._facts = ui.element("div").classes("facts")
 
     def refresh(self, session: Session, source: Source, axis: str, view: View) -> None:
-        """Write them again if they have changed."""
+        """Update them if they have changed."""
         heard = session.heard.version.get(f"axis {axis}", 0) if view.linear else 0
         stamp = (source.key, axis, source.stamp(axis), view, heard, chosen_units())
         if stamp == self._shown:
@@ -50,7 +50,7 @@ class Numbers:
 
 
 def show(fact: Fact) -> None:
-    """One number with its meaning as a tooltip, which a screen reader reads too."""
+    """Show one number with its meaning as a tooltip, which a screen reader reads too."""
     state = {True: " good", False: " bad", None: ""}[fact.good] + ("" if fact.sure else " unsure")
     with ui.element("div").classes(f"fact{state}").props("tabindex=0 role=group") as card:
         card.props["aria-label"], card.props["aria-description"] = fact.label, fact.meaning
@@ -60,7 +60,7 @@ def show(fact: Fact) -> None:
 
 
 def numbers_of(session: Session, source: Source, axis: str, view: View) -> tuple[list[Fact], str]:
-    """The numbers and the mathematics of the model that is shown: the story's, or the identifier's linear fit."""
+    """The numbers and the formula of the selected model: the story's, or the identifier's linear fit."""
     document = source.document(axis)
     if view.linear:
         tf = session.heard.transfer_function(axis)

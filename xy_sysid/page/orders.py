@@ -1,4 +1,4 @@
-"""Orders of a page and their progress: plain values that go to the worker and back."""
+"""Orders of a page and their progress, as plain values that are exchanged with the worker."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DOING = {
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One order for one axis; argument: the effect's name for add and remove. number: grows with every order."""
+    """One order for one axis; argument: the effect's name for add and remove; number: increases with every order."""
 
     number: int
     act: OrderKind
@@ -36,34 +36,34 @@ class Order:
 
     @property
     def words(self) -> str:
-        """What is being done."""
+        """The current activity in words."""
         return DOING[self.act].format(self.argument.replace("_", " "))
 
 
 @dataclass
 class Wish:
-    """What was clicked while something else was being done, the last of it; it is taken once, if its axis is still the one that is shown."""
+    """The last click during other work. It is carried out once, if its axis is still selected."""
 
     _kept: tuple[str, OrderKind, str] | None = None
 
     def keep(self, axis: str, act: OrderKind, argument: str = "") -> None:
-        """Note it until it is taken."""
+        """Store the click."""
         self._kept = axis, act, argument
 
     def taken(self, axis: str) -> tuple[OrderKind, str] | None:
-        """Act and argument, if there is a wish for this axis; then there is none any more."""
+        """Return action and argument of the stored click for this axis and clear it; None without one."""
         kept, self._kept = self._kept, None
         return kept[1:] if kept is not None and kept[0] == axis else None
 
     @property
     def words(self) -> str:
-        """What comes next, behind what is being done."""
+        """The next action in words, shown after the current activity."""
         return "" if self._kept is None else f"; then {DOING[self._kept[1]].format(self._kept[2].replace('_', ' '))}"
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How a recording is read. load: arguments of ``imports.load``; words: the same for a command; effect_files: effects of one's own."""
+    """How a recording is read. load: arguments of ``imports.load``; words: the same as command options; effect_files: the user's own effects."""
 
     load: Mapping[str, Any] = field(default_factory=dict)
     words: tuple[str, ...] = ()
@@ -71,7 +71,7 @@ class Reading:
 
 
 def tables(given: Mapping[str, Sequence[str]]) -> dict[str, Any]:
-    """Arguments of ``imports.load`` of the options --map, --unit, --scale and --rate of a table. Raises BadInput for what they do not take."""
+    """Arguments of ``imports.load`` from the options --map, --unit, --scale and --rate of a table. Raises BadInput for invalid values."""
     found: dict[str, Any] = {}
     for option, name in (("--map", "columns"), ("--unit", "units")):
         found |= {name: pairs(given[option], option)} if given.get(option) else {}
@@ -81,12 +81,12 @@ def tables(given: Mapping[str, Sequence[str]]) -> dict[str, Any]:
             found["rate"] = float(given["--rate"][0])
         except ValueError:
             raise BadInput("--rate", repr(given["--rate"][0]), "a number", "Give the sampling rate in Hz.") from None
-    FileReading(**found)  # refuses what no reader takes
+    FileReading(**found)  # refuses arguments that no reader accepts
     return found
 
 
 def read_so(usual: Reading, words: Sequence[str]) -> Reading:
-    """The usual reading with options of a table in words: ("--map", "time=A", "--rate", "500"). Raises BadInput for what they do not take."""
+    """The default reading with additional table options: ("--map", "time=A", "--rate", "500"). Raises BadInput for invalid values."""
     given: dict[str, list[str]] = {}
     for option, text in zip(words[::2], words[1::2], strict=True):
         given.setdefault(option, []).append(text)
@@ -95,7 +95,7 @@ def read_so(usual: Reading, words: Sequence[str]) -> Reading:
 
 @dataclass(frozen=True, slots=True)
 class WorkerNews:
-    """What the worker says. kind: opened (axes in content), progress (part), story (document), done, failed."""
+    """A message of the worker. kind: opened (axes in content), progress (part), story (document), done, failed."""
 
     kind: Literal["opened", "progress", "story", "done", "failed", "closed"]
     order: int = 0
@@ -107,7 +107,7 @@ class WorkerNews:
 
 @dataclass(frozen=True, slots=True)
 class OrderState:
-    """An order that is being fulfilled or waits; begun: seconds on the page's clock; part: 0..1, None if unknown."""
+    """An order in progress or waiting; begun: seconds on the page's clock; part: 0..1, None if unknown."""
 
     order: Order
     begun: float
@@ -117,12 +117,12 @@ class OrderState:
 
     @property
     def words(self) -> str:
-        """What is being done."""
+        """The current activity in words."""
         return self.said or self.order.words
 
 
 class Source(Protocol):
-    """Where an axis' story comes from: a recording, or the machine as it runs."""
+    """Source of an axis's story: a recording, or the running machine."""
 
     key: str
     title: str
@@ -137,19 +137,19 @@ class Source(Protocol):
         ...
 
     def stamp(self, axis: str) -> int:
-        """Grows whenever the document or the jobs of the axis change."""
+        """Counter that grows whenever the document or the jobs of the axis change."""
         ...
 
     def job(self, axis: str) -> OrderState | None:
-        """What is being done for the axis."""
+        """The current or waiting order of the axis."""
         ...
 
     def ready(self, axis: str) -> bool:
-        """Whether something can be asked for."""
+        """True if an order is possible."""
         ...
 
     def words(self, axis: str) -> str:
-        """What there is to say while there is no story."""
+        """The text to show while there is no story."""
         ...
 
     def effects(self) -> tuple[str, ...]:
@@ -157,25 +157,25 @@ class Source(Protocol):
         ...
 
     def problem(self) -> str:
-        """Why there is nothing (more) to come; empty while all is well."""
+        """Why no more data will arrive; empty if there is no problem."""
         ...
 
     def ask(self, act: OrderKind, axis: str, argument: str = "") -> None:
-        """Order something; raises BadInput for what cannot be asked for."""
+        """Give an order; raises BadInput for an impossible one."""
         ...
 
     def cancel(self, axis: str) -> None:
-        """Leave what is being done for the axis."""
+        """Cancel the order of the axis."""
         ...
 
     def used(self, axis: str) -> str:
-        """Which seconds of the data the story is about, and whether newer ones have come; empty where that is no question."""
+        """The time range of the story's data, and whether newer data have arrived; empty for a recording."""
         ...
 
     def awaits(self, axis: str) -> bool:
-        """Whether a story of the axis will come by itself."""
+        """True if a story of the axis will arrive by itself."""
         ...
 
     def newer(self, axis: str) -> bool:
-        """Whether there are newer data than those of the story."""
+        """True if there are newer data than those of the story."""
         ...

@@ -1,4 +1,4 @@
-"""One source on the page: its axes, their numbers, pictures and story. What has not changed is not drawn again."""
+"""One source on the page: its axes, numbers, figures and story. Only changes are redrawn."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from xy_sysid.page.story_card import StoryCard
 from xy_sysid.page.use_card import UseCard
 from xy_sysid.page.views import NOW, View, view_of, views
 
-SHORT = 3  # letters of an axis' name that needs the word axis before it
+SHORT = 3  # letters; a shorter axis name gets the word axis before it
 
 
 class Panel:
     """A source in one browser."""
 
     def __init__(self, session: Session, source: Source, wanted: SourceView) -> None:
-        """wanted: what the address asks for; effects that it names are added once the rigid model is fitted, unless others are there."""
+        """wanted: the view from the address; its effects are added once the rigid model is fitted, unless the story already has effects."""
         self._session, self._source, self._wanted = session, source, wanted
         self._adding = {} if source.live else dict(wanted.effects)
         self._axis = ""
@@ -75,11 +75,11 @@ class Panel:
         self._control = Control(self._session)
 
     def delete(self) -> None:
-        """Take it off the page."""
+        """Remove the panel from the page."""
         self._root.delete()
 
     async def refresh(self) -> None:
-        """Draw what has changed."""
+        """Redraw what has changed."""
         source = self._source
         self._head()
         axes = source.axes()
@@ -91,9 +91,9 @@ class Panel:
         self._add_wanted()
         begun = source.document(self._axis) is not None
         waits = self._control is not None and self._control.refresh(self._axes, begun)
-        axis, view = self._axis, self._choose()  # without an axis every card keeps its place, and says what is waited for
+        axis, view = self._axis, self._choose()  # without an axis every card keeps its space and says what it waits for
         self._use.refresh()
-        self._numbers.refresh(self._session, source, axis, view)  # first what waits for nothing: meanwhile the browser may go
+        self._numbers.refresh(self._session, source, axis, view)  # first the parts that wait for nothing: the browser may disconnect meanwhile
         await self._story.refresh(axis, quiet=waits)
         if self._settle is not None:
             self._settle.refresh(axis)
@@ -108,7 +108,7 @@ class Panel:
         await self._cards.refresh(axis, view)
 
     def _choose(self) -> View:
-        """What is looked at; whenever the story goes on, its newest model. What was chosen while the first model was awaited stays."""
+        """The selected model; the newest one whenever the story advances. A choice made before the first model is kept."""
         document = self._source.document(self._axis)
         found = views(document, self._source.live, self._source.awaits(self._axis))
         goes_on = self._axis, len(document["steps"]) if document is not None else 0, tuple(found)
@@ -119,10 +119,10 @@ class Panel:
             if self._wanted.model in found and not self._adding.get(self._axis):
                 value, self._wanted = self._wanted.model, replace(self._wanted, model="")
             self._view.set_options(found, value=value)
-        elif found != self._views:  # other words for the same: what was chosen stays
+        elif found != self._views:  # only the wording differs: the choice is kept
             self._views = found
             self._view.set_options(found, value=self._view.value)
-        self._model.classes(remove="idle" if len(found) > 1 else "", add="" if len(found) > 1 else "idle")  # its place is kept
+        self._model.classes(remove="idle" if len(found) > 1 else "", add="" if len(found) > 1 else "idle")  # keep its space
         return view_of(str(self._view.value or NOW))
 
     def _head(self) -> None:
@@ -149,7 +149,7 @@ class Panel:
             self._axis = axis
 
     def view(self) -> SourceView:
-        """What is shown, for the address; what the address asked for and has not come yet is still in it."""
+        """The current view, for the address, including requested parts that have not arrived yet."""
         source, chosen = self._source, str(self._view.value or "")
         effects = {axis: tuple(effects_of(source.document(axis))) for axis in self._axes if not source.live}
         for axis, names in self._adding.items():
@@ -164,7 +164,7 @@ class Panel:
         )
 
     def _add_wanted(self) -> None:
-        """Add the effects that the address names, one after the other. A story with other effects is somebody's, and stays."""
+        """Add the effects from the address one by one. If the story has other effects, a user added them, and it is kept."""
         source = self._source
         for axis, names in list(self._adding.items()):
             if (self._axes and axis not in self._axes) or source.problem():

@@ -1,4 +1,4 @@
-"""The cards of pictures of one axis: each with how to read it, and its content in words for who cannot see it."""
+"""The figure cards of one axis: each figure with an explanation, and its content in words for screen readers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Document = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One picture of a story; tab: which of the card's pictures are chosen between; height: of its figure, px."""
+    """One figure of a story; tab: its label among the card's tabs; height: of the figure, px."""
 
     name: str
     card: str
@@ -32,7 +32,7 @@ class Picture:
 
 
 def aligned(make: Callable[..., go.Figure]) -> Callable[..., go.Figure]:
-    """The figure with the frequencies of the whole response and with fixed margins, so that those under each other line up."""
+    """Wrap a figure function: fixed margins and the frequency range of the full response, so that stacked figures line up."""
 
     def made(document: Document, step: int | None = None) -> go.Figure:
         figure = make(document, step)
@@ -131,10 +131,10 @@ PICTURES = (
 
 
 class Cards:
-    """All pictures of the axis that is shown."""
+    """All figures of the selected axis."""
 
     def __init__(self, session: Session, source: Source, beside: Plot, chosen: Sequence[str] = ()) -> None:
-        """beside: the plot over frequency of another card, which zooms with these; chosen: pictures of the tabs that are open at first."""
+        """beside: the frequency plot of another card, which zooms with these; chosen: figures of the tabs that are open at first."""
         self._session, self._source, self._beside, self._wanted = session, source, beside, chosen
         self._bars: list[tuple[str, ui.tab_panels]] = []
         self._plots: dict[str, Plot] = {}
@@ -146,12 +146,12 @@ class Cards:
             self._cards[title] = card
 
     def chosen(self) -> tuple[str, ...]:
-        """Pictures of the open tabs that are not the first of their card."""
+        """Figures of the open tabs, except the first tab of each card."""
         return tuple(str(panels.value) for first, panels in self._bars if panels.value != first)
 
     async def refresh(self, axis: str, view: View) -> None:
         """Draw again what has changed."""
-        stamp = self._source.stamp(axis)  # before the document: see StoryCard
+        stamp = self._source.stamp(axis)  # read before the document: see StoryCard
         document = self._source.document(axis)
         for card in self._cards.values():
             card.set_visibility(not view.linear)
@@ -187,7 +187,7 @@ class Cards:
 
 
 def words(picture: Picture, document: Document, at: int | None = None) -> str:
-    """What a picture shows, for a screen reader."""
+    """The content of a figure in words, for screen readers."""
     step = document["steps"][-1 if at is None else at]
     failing = (step.get("pictures") or {}).get("failing") or []
     told = "; ".join(place["sentence"] for place in failing[:3]) or "nothing stands out"

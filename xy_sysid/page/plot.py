@@ -1,4 +1,4 @@
-"""One figure in one browser, with how to read it and buttons to keep it; and figures that zoom together."""
+"""One figure in one browser, with an explanation and download buttons; and figures that zoom together."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from xy_sysid.report.figure_data import table
 from xy_sysid.units import chosen_units
 
 EMPTY = {"paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)"}
-CONFIG = {"displayModeBar": False, "responsive": True, "scrollZoom": False}  # its tools would lie over legends and words
+CONFIG = {"displayModeBar": False, "responsive": True, "scrollZoom": False}  # Plotly's toolbar would cover legends and labels
 HIDDEN = {"visible": False}
 KINDS = ("svg", "png", "csv")
 
 
 class Plot:
-    """One figure in one browser, with how to read it and buttons to keep it."""
+    """One figure in one browser, with an explanation and download buttons."""
 
     def __init__(self, reading: str, name: str = "figure", height: int = 200) -> None:
-        """height: px of the figures that it will show, kept free until then."""
+        """height: px of the figures that it will show; the space is reserved."""
         self._empty = {"data": [], "layout": {"height": height, "xaxis": HIDDEN, "yaxis": HIDDEN, **EMPTY}, "config": CONFIG}
         self._shown: object = None
         self._said = ""
@@ -38,7 +38,7 @@ class Plot:
                     keep.props(f'aria-label="save {name} as {kind.upper()}"')
 
     async def show(self, session: Session, key: tuple[object, ...], make: Callable[..., go.Figure], *arguments: Any, **named: Any) -> None:
-        """Draw it unless it is drawn already; computed outside the page's loop, so that nothing waits for it."""
+        """Draw the figure unless it is already shown. It is computed outside the event loop, which therefore does not wait."""
         key = (*key, chosen_units())
         if key == self._shown:
             return
@@ -50,7 +50,7 @@ class Plot:
             self.plot.update_figure(drawn)
 
     def wait(self, words: str = "") -> None:
-        """Show that there is nothing yet; words: what is waited for, for who cannot see it."""
+        """Show an empty space; words: what the page waits for, for screen readers."""
         self.say(words)
         if self._shown is not None:
             self._shown, self._drawn = None, {}
@@ -58,7 +58,7 @@ class Plot:
             self.plot.update_figure(self._empty)
 
     def say(self, words: str) -> None:
-        """The picture's content in words."""
+        """Set the figure's content in words."""
         if words != self._said:
             self._said = words
             self.plot.props["aria-label"] = words
@@ -71,7 +71,7 @@ class Plot:
 
 
 class Linked:
-    """Plots over the same frequencies: who zooms one zooms all."""
+    """Plots over the same frequencies: zooming one zooms all."""
 
     def __init__(self, plots: list[Plot]) -> None:
         self._plots, self._range = plots, ""
@@ -79,7 +79,7 @@ class Linked:
             plot.plot.on("plotly_relayout", partial(self._moved, plot))
 
     def _moved(self, source: Plot, event: events.GenericEventArguments) -> None:
-        """Give the others the range of the one that was moved; they answer with the same range, which changes nothing more."""
+        """Apply the zoom range of one plot to the others; they answer with the same range, which has no further effect."""
         ends = [event.args.get(f"{axis}.range[{end}]") for axis in ("xaxis2", "xaxis") for end in (0, 1)]
         found = next((pair for pair in (ends[:2], ends[2:]) if all(isinstance(value, (int, float)) for value in pair)), None)
         whole = bool(event.args.get("xaxis.autorange") or event.args.get("xaxis2.autorange"))
@@ -93,7 +93,7 @@ class Linked:
 
 
 def plain(figure: go.Figure) -> dict[str, Any]:
-    """As the browser takes it; what the user has zoomed into stays."""
+    """The figure as JSON for the browser; the user's zoom is kept."""
     figure.update_layout(uirevision="keep", **EMPTY)
     made: dict[str, Any] = figure.to_plotly_json()
     return {**made, "config": CONFIG}

@@ -1,4 +1,4 @@
-"""The card *More about this recording*: step tests, servos, and numbers in SI, as the commands say them."""
+"""The card *More about this recording*: step tests, servos, and numbers in SI, in the words of the commands."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from xy_sysid.page.session import Session
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A command that is asked about a recording. options: that it takes of the card's fields."""
+    """A command that analyses a recording. options: its options that are fields of the card."""
 
     command: str
     text: str
@@ -57,7 +57,7 @@ class QuestionsCard:
         self._text.set_visibility(False)
 
     def refresh(self) -> None:
-        """Shown for what was read."""
+        """Show the card once the recording is read."""
         self._card.set_visibility(bool(self._source.axes()))
 
     async def _ask(self, question: Question) -> None:
@@ -81,10 +81,10 @@ class QuestionsCard:
 
 
 def answer(command: str, path: Path, words: tuple[str, ...]) -> str:
-    """What a command says of a recording that is read so. Raises BadInput with what it says."""
+    """The output of a command for a recording with these reading options. Raises BadInput with the command's error."""
     return asked((command, str(path), *words), (command, "not told", "a recording that determines it"))
 
 
 def as_html(text: str) -> str:
-    """Lines as the command prints them."""
+    """The command's printed lines as HTML."""
     return f'<pre class="wrap">{html.escape(text)}</pre>'

@@ -1,4 +1,4 @@
-"""Records a bag from the page: ``xy-sysid record`` as a process of its own."""
+"""Records a bag from the page: runs ``xy-sysid record`` as a separate process."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Recorder:
 
     @property
     def running(self) -> bool:
-        """Whether it records now."""
+        """True while it records."""
         return self._process is not None and self._process.poll() is None
 
     def start(self, path: Path, namespace: str) -> None:
-        """Begin a new bag there."""
+        """Start a new bag at this path."""
         command = [sys.executable, "-m", "xy_sysid", "record", str(path), "--namespace", namespace]
         if sys.platform == "linux":
             command = [sys.executable, "-S", "-c", FOLLOW, str(os.getpid()), *command]
@@ -59,7 +59,7 @@ class Recorder:
         return f"{self.path.name} was not recorded: {lines[-1] if lines else f'exit code {process.returncode}'}"
 
     def words(self) -> str:
-        """What it does now."""
+        """The current state in words."""
         if self.running and self.path is not None:
             return f"recording {self.path.name}, {seconds_text(time.monotonic() - self._begun)}"
         if self._process is not None and self.path is not None:

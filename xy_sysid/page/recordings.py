@@ -1,4 +1,4 @@
-"""A recording that is open on the page: its worker, the stories so far, and the orders that wait."""
+"""A recording that is open on the page: its worker, its stories so far, and the waiting orders."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ENDED = "its process has ended. Open it again; the log may say why."
 
 
 class OpenRecording:
-    """A Source whose fits run in a process of their own."""
+    """A Source whose fits run in a separate process."""
 
     live = False
 
@@ -55,31 +55,31 @@ class OpenRecording:
         return self._documents.get(axis)
 
     def stamp(self, axis: str) -> int:
-        """Grows with each change."""
+        """Counter that grows with each change."""
         return self._stamps.get(axis, 0) + self._stamps.get("", 0)
 
     def job(self, axis: str) -> OrderState | None:
-        """What is being done for the axis."""
+        """The current or waiting order of the axis."""
         return self._jobs.get(axis)
 
     def ready(self, axis: str) -> bool:
-        """Whether something can be asked for: the rigid base is fitted and the worker lives."""
+        """True if an order is possible: the rigid model is fitted and the worker runs."""
         return axis in self._documents and not self._problem
 
     def words(self, axis: str) -> str:
-        """While there is no story."""
+        """The text to show while there is no story."""
         return "" if self._problem else "The rigid model is being fitted ..."
 
     def effects(self) -> tuple[str, ...]:
-        """Of the library that the worker has, files of one's own included."""
+        """Effects of the worker's library, including the user's own files."""
         return tuple(self.about.get("effects", ()))
 
     def problem(self) -> str:
-        """Why it is closed."""
+        """Why the recording is closed; empty while it is open."""
         return self._problem
 
     def ask(self, act: OrderKind, axis: str, argument: str = "") -> None:
-        """Order something for an axis, one thing at a time."""
+        """Order something for an axis; one order per axis at a time."""
         if axis not in self.axes():
             raise BadInput("axis", repr(axis), ", ".join(self.axes()) or "none yet", "Wait until the recording has been read.")
         if axis in self._jobs:
@@ -90,19 +90,19 @@ class OpenRecording:
         self._send(order)
 
     def used(self, axis: str) -> str:
-        """A recording is used whole."""
+        """Empty: a story uses the full recording."""
         return ""
 
     def awaits(self, axis: str) -> bool:
-        """The rigid model is fitted unasked."""
+        """True at first: the rigid model is fitted automatically."""
         return not self._problem
 
     def newer(self, axis: str) -> bool:
-        """Nothing comes after it."""
+        """False: a recording gets no newer data."""
         return False
 
     def cancel(self, axis: str) -> None:
-        """Leave the fit of this axis; if it waits behind another one, that one goes on."""
+        """Cancel the order of this axis; the fit of another axis continues."""
         job = self._jobs.get(axis)
         if job is None or self._process.pid is None or not self._process.is_alive():
             return
@@ -113,7 +113,7 @@ class OpenRecording:
             self._say(f"{self.title}: axis {axis} waits for axis {first.order.axis}; cancel that one first")
 
     def close(self) -> None:
-        """End the worker."""
+        """End the worker process."""
         self._problem = self._problem or "closed"
         self._orders.close()
         self._process.join(0.5)
@@ -153,7 +153,7 @@ class OpenRecording:
             if news.kind == "failed":
                 self._say(f"{self.title}, axis {news.axis}: {news.words}")
             self._changed(news.axis)
-        waiting = list(self._jobs.items())  # another thread may ask for more meanwhile
+        waiting = list(self._jobs.items())  # another thread may add orders meanwhile
         for axis, job in waiting:
             running = job.order.number == min(item.order.number for _, item in waiting)
             if running != job.running:

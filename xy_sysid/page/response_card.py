@@ -1,4 +1,4 @@
-"""A file that holds a measured frequency response: the response with its fit, and what the fit says. Samples there are none."""
+"""The card of a file that holds a measured frequency response without samples: the response with its fit, and the fit's results."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ResponseCard:
         self._root = ui.element("div").classes("stack").props("data-part=responses")
 
     async def refresh(self) -> None:
-        """Draw what was read."""
+        """Draw the response of the file."""
         for name, told in self._source.about.get("responses", {}).items():
             if name not in self._plots:
                 with self._root, ui.element("section").classes("card").props(f'aria-label="response of {name}"'):

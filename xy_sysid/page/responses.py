@@ -14,7 +14,7 @@ from xy_sysid.report.plots import bode
 
 
 def fitted_responses(path: Path, load: Mapping[str, Any]) -> dict[str, dict[str, Any]] | None:
-    """Picture and words of the fit of each response in a file; None of a file of samples. Raises BadInput and BadRecording. Takes seconds."""
+    """Figure and words of the fit of each response in a file; None for a file of samples. Raises BadInput and BadRecording. Takes seconds."""
     kind, reading = format_of(path), Reading(**load)
     if not reading.a_response(kind.kind == "response"):
         return None

@@ -1,4 +1,4 @@
-"""The web server: one page, the STOP that works without it, and the rules of who may come in."""
+"""The web server: one page, a STOP that works without the page, and access control."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from xy_sysid.page.guard import Guard
 from xy_sysid.page.layout import build
 from xy_sysid.page.session import Session
 
-CONFIRMS = 2.0  # s in which the machine confirms a STOP; then the request is answered that it has not
-GRACE = 1  # s that open pages may take when the server ends
-PATIENCE = 60.0  # s that a page may take to be built, with the recordings that its address names
-PORTS = 20  # tried after the wished one when that is taken
+CONFIRMS = 2.0  # s to wait for the machine's confirmation of STOP; after that the request reports that there was none
+GRACE = 1  # s for open pages to close when the server ends
+PATIENCE = 60.0  # s for a page to be built, with the recordings in its address
+PORTS = 20  # ports to try after the requested one if it is in use
 
 
 def serve(session: Session, host: str, port: int, token: str, browse: bool, say: Callable[[str], None]) -> None:
-    """Serve until Ctrl-C. say: takes the address once it can be opened. Raises BadInput if the address cannot be had."""
+    """Serve until Ctrl-C. say: receives the address once it can be opened. Raises BadInput if the address is not available."""
     access = rules(host, token)
     app = application(session, access)
     with closing(listen(host, port)) as place:
@@ -43,28 +43,28 @@ def serve(session: Session, host: str, port: int, token: str, browse: bool, say:
             access_log=False,
             timeout_graceful_shutdown=GRACE,
             server_header=False,
-            ws="websockets",  # it closes a line that is no UTF-8; its successor prints a traceback
+            ws="websockets",  # it closes a connection with invalid UTF-8; its successor prints a traceback
             ws_max_size=1 << 22,
             lifespan="on",
         )
-        warnings.filterwarnings("ignore", message="The `websockets` implementation is deprecated")  # that is no matter of who sees the page
+        warnings.filterwarnings("ignore", message="The `websockets` implementation is deprecated")  # not relevant to a user of the page
         uvicorn.Server(config).run(sockets=[place])
 
 
 def application(session: Session, access: Access) -> FastAPI:
-    """The application with its guard before everything."""
-    run.process_pool_start_method = "spawn"  # a copy of this process, with the threads of ROS in it, may stand still for ever
+    """The application, with the guard in front of it."""
+    run.process_pool_start_method = "spawn"  # a fork of this process, with the threads of ROS in it, may hang
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
     @app.post("/stop")
     def stop() -> JSONResponse:
-        """Zero volts; answered when the machine has confirmed it, or that it has not."""
+        """Command zero volts; the answer says whether the machine has confirmed it."""
         stopped, words = session.stop(CONFIRMS)
         return JSONResponse({"asked": session.link is not None, "stopped": stopped, "words": words})
 
     @app.get("/alive")
     def alive() -> JSONResponse:
-        """For whoever starts the server."""
+        """Answer a health check of the process that starts the server."""
         return JSONResponse({"page": "xy_sysid"})
 
     assets = files("xy_sysid.page")
@@ -86,7 +86,7 @@ def application(session: Session, access: Access) -> FastAPI:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket on the wished port, or on one of the next if that is taken; port 0 is any."""
+    """A socket on the requested port, or on one of the next if it is in use; port 0 is any."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     problem = ""
     for number in range(port, port + (PORTS if port else 1)):
@@ -98,6 +98,6 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def url(host: str, port: int, access: Access) -> str:
-    """Where to go, with the token if there is one."""
+    """The address to open, with the token if there is one."""
     name = socket.gethostname() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
     return f"http://{name}:{port}/" + (f"?token={access.token}" if access.token else "")

@@ -1,4 +1,4 @@
-"""What all open pages share: the machine, the recordings, the messages. One for each server."""
+"""State that all open pages share: the machine, the recordings, the messages. One session per server."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 MOST_OPEN = 6  # recordings at a time
 MESSAGES = 50
-ONCE = 3.0  # s in which the same words are one message
-DRAWN = 200  # figures kept, so that a second page does not draw them again
+ONCE = 3.0  # s in which the same text is shown only once
+DRAWN = 200  # cached figures, so that a second page does not redraw them
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One line for people, with the time of day; at: s on the clock of this process."""
+    """One message, with the time of day; at: s on the clock of this process."""
 
     number: int
     clock: str
@@ -56,7 +56,7 @@ class Session:
         self.link: Link | None = None
         self.live: Live | None = None
         self.settling: Settling | None = Settling(shelf.folder, namespace, self.say, tuple(map(str, self.reading.effect_files))) if live else None
-        if live:  # ROS 2 is needed for this alone
+        if live:  # only the live machine needs ROS 2
             from xy_sysid.page.link import Link
             from xy_sysid.page.live import Live
 
@@ -68,7 +68,7 @@ class Session:
         return [*([self.live] if self.live else []), *self.recordings]
 
     def say(self, words: str, good: bool = False) -> None:
-        """A line on every page; what was said a moment ago is not said twice, as by the button and the key of one STOP."""
+        """Show a message on every page. The same text within ONCE seconds is dropped, for example after the button and the key of one STOP."""
         now = time.monotonic()
         if any(message.words == words and now - message.at < ONCE for message in list(self.messages)):
             return
@@ -76,7 +76,7 @@ class Session:
         self.messages.append(Message(number=self._count, clock=time.strftime("%H:%M:%S"), at=now, words=words, good=good))
 
     def open(self, path: Path, title: str = "", reading: Reading | None = None) -> OpenRecording:
-        """Open a recording beside the others. reading: how it is read, if not as all are."""
+        """Open one more recording. reading: how it is read, if not by the session's default."""
         if len(self.recordings) >= MOST_OPEN:
             raise BadInput("recordings", f"{MOST_OPEN} already", f"at most {MOST_OPEN}", "Close one first.")
         made = OpenRecording(path, title, self.say, reading or self.reading)
@@ -84,16 +84,16 @@ class Session:
         return made
 
     def name_of(self, one: OpenRecording) -> str:
-        """The name of an open recording in an address: that of the shelf, or its title if it is from elsewhere."""
+        """The name of an open recording in an address: its name on the shelf, or its title if it is from elsewhere."""
         path = one.path.resolve()
         return str(path.relative_to(self.shelf.folder)) if path.is_relative_to(self.shelf.folder) else one.title
 
     def own_words(self, one: OpenRecording) -> tuple[str, ...]:
-        """How an open recording is read, beyond how all are."""
+        """Reading options of an open recording beyond the session's default."""
         return one.how.words[len(self.reading.words) :]
 
     def open_view(self, view: PageView) -> None:
-        """Open the recordings of a view that are not open yet; those that cannot be opened are said on every page."""
+        """Open the recordings of a view that are not open yet; every page shows an error for one that cannot be opened."""
         with self._opening:
             for wanted in view.sources:
                 there = {(self.name_of(one), self.own_words(one)) for one in self.recordings}
@@ -107,13 +107,13 @@ class Session:
                     self.say(str(problem))
 
     def close_recording(self, key: str) -> None:
-        """Take one off the page."""
+        """Close one recording."""
         for one in [one for one in self.recordings if one.key == key]:
             self.recordings.remove(one)
             one.close()
 
     def stop(self, patience: float = 0.0) -> tuple[bool, str]:
-        """Zero volts, now; whether the machine has confirmed it after so many seconds at most, and what there is to say."""
+        """Command zero volts. Returns whether the machine has confirmed it within ``patience`` seconds, and a sentence."""
         if self.link is None:
             return False, "this page drives no machine"
         self.stopping = True
@@ -133,7 +133,7 @@ class Session:
         return answer[0]
 
     def figure(self, key: tuple[object, ...], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """The figure of that key, drawn once for all pages."""
+        """The figure with this key, drawn once for all pages."""
         found = self._figures.get(key)
         if found is None:
             found = self._figures[key] = make()
@@ -142,7 +142,7 @@ class Session:
         return found
 
     def close(self) -> None:
-        """End what was started."""
+        """End all processes and threads that the session started."""
         if self.recorder.running:
             self.recorder.stop()
         for one in self.recordings:

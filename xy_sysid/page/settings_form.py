@@ -1,4 +1,4 @@
-"""The excitation settings of one axis, with their units and limits; what is not allowed is refused here, and once more by the node."""
+"""The excitation settings of one axis, with units and limits. The form refuses invalid values, and the node checks them again."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ OFTEN = ("kind", "rms", "low", "high", "limit")  # shown first
 
 
 def changes(knob_values: dict[str, Any], typed: dict[str, Any]) -> dict[str, Any]:
-    """What was typed and differs from what the node has, with the types of the settings.
+    """The typed values that differ from the node's, with the types of the settings.
 
-    Raises BadInput that names the value, what is allowed and the next act.
+    Raises BadInput that names the value, the allowed range and the next action.
     """
     known = {item.name: item for item in knobs(AxisExcitation())}
     wanted: dict[str, Any] = {}
@@ -37,7 +37,7 @@ def changes(knob_values: dict[str, Any], typed: dict[str, Any]) -> dict[str, Any
 
 
 def limits(item: Knob, units: Units = USUAL) -> str:
-    """0 to 100 V, or the choices; units: what V and m stand for."""
+    """The allowed range as text, 0 to 100 V, or the choices; units: display units of V and m."""
     if item.choices:
         return ", ".join(item.choices)
     if item.low is None or item.high is None:
@@ -46,7 +46,7 @@ def limits(item: Knob, units: Units = USUAL) -> str:
 
 
 def labelled(item: Knob, units: Units = USUAL) -> str:
-    """rms (V), or rms (N m)."""
+    """The label with its unit: rms (V), or rms (N m)."""
     return f"{item.name} ({units.of(item.unit)})" if item.unit else item.name
 
 
@@ -80,7 +80,7 @@ class SettingsForm:
         self.read()
 
     def read(self) -> None:
-        """Ask the node for its values."""
+        """Request the node's values."""
         if self._session.link is not None:
             names = [f"{self._axis}.{name}" for name in self._fields]
             self._session.link.get_parameters("excitation", names, self._got, lambda done, words: None)
@@ -89,14 +89,14 @@ class SettingsForm:
         if item.choices:
             made: Any = ui.select(list(item.choices), label=labelled(item), value=item.value)
         else:
-            made = typed(ui.number(labelled(item), value=item.value))  # no min and max: a wrong value is refused in words, not silently changed
+            made = typed(ui.number(labelled(item), value=item.value))  # no min and max: wrong values are refused, never silently changed
         made.props(f"outlined dense data-knob={self._axis}.{item.name}")
         with made:
             self._tips[item.name] = ui.tooltip(f"{item.meaning}; {limits(item)}")
         self._fields[item.name] = made
 
     def _got(self, values: dict[str, Any]) -> None:
-        """Called in the link's thread; the timer shows it."""
+        """Store the values; called in the link's thread, shown by the timer."""
         self._now = {name.partition(".")[2]: value for name, value in values.items() if value is not None}
         self._fresh = True
 
@@ -113,7 +113,7 @@ class SettingsForm:
             self._told.classes(remove="good bad", add="good" if good else "bad")
 
     def _name(self, units: Units) -> None:
-        """Every field in the units of what the excitation sends and hears."""
+        """Label every field with the units of the excitation's output and feedback."""
         if units != self._units:
             self._units = units
             for item in knobs(AxisExcitation()):

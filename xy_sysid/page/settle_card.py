@@ -1,4 +1,4 @@
-"""What to measure next, in one browser: the next experiment is designed, run, and so on until nothing is left to settle."""
+"""The card *what to measure next*: it designs and runs the next experiment until the diagnosis is settled."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class SettleCard:
                 self._end = heeded(ui.button("End here", on_click=self._stop).props("outline dense no-caps data-act=end-settle"))
 
     def refresh(self, axis: str) -> None:
-        """Show what is now."""
+        """Update the card."""
         settling = self._session.settling
         if settling is None:
             return
@@ -74,7 +74,7 @@ class SettleCard:
                 self._session.say(str(problem))
 
     def _ask_run(self) -> None:
-        """A real machine moves: ask once more, as for Activate."""
+        """Ask for confirmation because a real machine will move, as for Activate."""
         settling = self._session.settling
         if settling is None or not settling.waits:
             return

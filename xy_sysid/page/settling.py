@@ -1,4 +1,4 @@
-"""The walk to a settled diagnosis that the page has started, shared by all tabs: at most one at a time."""
+"""The series of experiments that settles a diagnosis, started from the page and shared by all tabs: at most one at a time."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ if TYPE_CHECKING:
     from xy_sysid.nodes.settle import Settler
     from xy_sysid.page.live import Live
 
-JOIN = 3.0  # s that the walk may take to end when the page does
+JOIN = 3.0  # s for the walk to end when the page closes
 
 
 class Settling:
-    """start, then go on; ``steps`` and ``doing`` say how far it is."""
+    """Call start, then go; ``steps`` and ``doing`` report progress."""
 
     def __init__(self, folder: Path, namespace: str, say: Callable[[str, bool], None], effect_files: tuple[str, ...] = ()) -> None:
-        """folder: of recordings; say: takes a sentence for everybody, and whether it is good news; effect_files: with effects of the user's own."""
+        """folder: of recordings; say: receives a sentence for every page, and whether it is good news; effect_files: the user's own effects."""
         self._folder, self._namespace, self._say, self._effect_files = folder, namespace, say, effect_files
         self._thread: threading.Thread | None = None
         self._settler: Settler | None = None
         self._ended, self._go = threading.Event(), threading.Event()
         self.axis, self.folder, self.wished = "", folder, ""  # wished: axis for which experiments start automatically
-        self.first = False  # whether its card stands before the story
-        self.sets: tuple[tuple[str, ...], ...] = ()  # of effects that are to be distinguished; empty: those that the diagnosis leaves possible
+        self.first = False  # True if its card is placed above the story
+        self.sets: tuple[tuple[str, ...], ...] = ()  # sets of effects to distinguish; empty: those that the diagnosis leaves possible
 
     @property
     def running(self) -> bool:
-        """Whether a walk is under way."""
+        """True while a walk is in progress."""
         return self._thread is not None and self._thread.is_alive()
 
     @property
     def going(self) -> bool:
-        """Whether it goes on by itself."""
+        """True if it continues without confirmation."""
         return self._go.is_set()
 
     @property
     def waits(self) -> bool:
-        """Whether an experiment is designed and somebody has to say that it may run."""
+        """True if an experiment is designed and a user must confirm the run."""
         return self.running and not self.going and bool(self.steps) and not self.steps[-1]["ending"]
 
     @property
@@ -52,17 +52,17 @@ class Settling:
 
     @property
     def doing(self) -> str:
-        """What is being done."""
+        """The current activity in words."""
         return self._settler.doing if self._settler is not None and self.running else ""
 
     @property
     def part(self) -> float:
-        """Part of the design that is done."""
+        """Fraction of the design that is done."""
         return self._settler.part if self._settler is not None else 0.0
 
     @property
     def problem(self) -> str:
-        """What went wrong, or that it was stopped; empty while all is well."""
+        """The error, or that it was stopped; empty if there is no problem."""
         if self._settler is None or self.running:
             return ""
         return self._settler.outcome if self._settler.problem or self._settler.ending == "stopped" else ""
@@ -93,7 +93,7 @@ class Settling:
         self._thread.start()
 
     def attend(self, live: Live | None) -> None:
-        """Start by itself where the page was told to, once the axis is driven and its rigid model is shown; have the end explained by the story."""
+        """Start automatically if the page was started so, once the axis is driven and its rigid model is shown; let the story explain the end."""
         if live is None or not self.wished:
             return
         if not self.steps and not self.running and live.heard.driving() and live.document(self.wished) is not None:
@@ -103,7 +103,7 @@ class Settling:
             live.ask("auto", axis)
 
     def go(self) -> None:
-        """Run the designed experiment, and go on until nothing is left to settle."""
+        """Run the designed experiment, and continue until the diagnosis is settled."""
         self._go.set()
 
     def end(self) -> None:
@@ -111,7 +111,7 @@ class Settling:
         self._ended.set()
 
     def close(self) -> None:
-        """The page ends."""
+        """End the walk because the page closes."""
         self.end()
         if self._thread is not None:
             self._thread.join(JOIN)

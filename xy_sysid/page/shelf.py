@@ -1,4 +1,4 @@
-"""The folder whose recordings the page may open and into which it may record. What a browser names is looked up, never joined to a path."""
+"""The folder whose recordings the page may open and to which it may record. Names from a browser are looked up, never joined to a path."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from xy_sysid.errors import BadInput
 from xy_sysid.imports.registry import TABLES
 from xy_sysid.imports.several_files import others
 
-TEXTS = (".txt", ".log", ".json")  # which are mostly something else: listed when asked for
+TEXTS = (".txt", ".log", ".json")  # rarely recordings: listed on request only
 LISTED = (*(ending for ending in TABLES if ending not in TEXTS), ".mcap", ".db3")
 MOST = 200  # recordings listed
-DEEP = 2  # folders below the shelf that are looked into
+DEEP = 2  # folder levels below the shelf that are searched
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
@@ -24,7 +24,7 @@ class Shelf:
         self.folder = folder.resolve()
 
     def names(self, texts: bool = False) -> list[str]:
-        """What can be opened: bags (folders with a metadata.yaml) and tables, by their path below the folder. texts: with those of TEXTS."""
+        """Recordings: bags (folders with a metadata.yaml) and tables, by their path below the folder. texts: include those of TEXTS."""
         found: list[str] = []
         self._look(self.folder, DEEP, found, (*LISTED, *TEXTS) if texts else LISTED)
         return sorted(found)[:MOST]
@@ -47,20 +47,20 @@ class Shelf:
                 found.append(name)
 
     def find(self, name: str) -> Path:
-        """The recording of that name; raises BadInput for whatever is not in the list, a path that leads elsewhere included."""
+        """The recording of that name; raises BadInput for a name that is not in the list, including a path that leads elsewhere."""
         if name not in self.names(texts=True):
             raise BadInput("recording", repr(name[:80]), f"one of the list of {self.folder.name}", "Choose one.")
         return self.folder / name
 
     def beside(self, path: Path, columns: Mapping[str, str]) -> None:
-        """Raises BadInput where one of the columns (FILE:COLUMN) lies in a file that is not in the list."""
+        """Raises BadInput if one of the columns (FILE:COLUMN) is in a file that is not in the list."""
         here = {self.folder / name for name in self.names(texts=True)}
         for other in others(path, columns):
             if other not in here:
                 raise BadInput("file of a column", repr(other.name[:80]), f"one of the list of {self.folder.name}", "Choose one.")
 
     def new(self, name: str) -> Path:
-        """Where a new bag of that name goes; raises BadInput for anything but a plain name that is still free."""
+        """The path of a new bag with that name; raises BadInput unless it is a plain name that is not in use."""
         if not NAME.fullmatch(name):
             raise BadInput("name of the bag", repr(name[:80]), "1 to 64 letters, digits, - _ and . (no folders)", "Give another name.")
         path = self.folder / name

@@ -1,4 +1,4 @@
-"""The story of an axis in one column: headline, what is next, falling ladder, what is in the model, candidates, look-alikes."""
+"""The story of an axis in one column: headline, next action, errors of all steps, effects in the model, candidates, look-alikes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class StoryCard:
     """One axis of one source, in one browser."""
 
     def __init__(self, session: Session, source: Source, between: Callable[[], None]) -> None:
-        """between: makes what stands between the headline and the evidence."""
+        """between: builds the elements between the headline and the evidence."""
         self._session, self._source, self._axis = session, source, ""
         self._shown: object = None
         self._filled: object = None
@@ -87,12 +87,12 @@ class StoryCard:
                 self._downloads = Downloads(session, source, lambda: self._axis)
 
     async def refresh(self, axis: str, quiet: bool = False) -> None:
-        """Write and draw again what has changed; quiet: something else on the page is to be done first."""
+        """Update what has changed; quiet: another action on the page comes first."""
         self._axis = axis
-        at = self._source.stamp(axis)  # before the document, which another thread may exchange: never an old picture under a new stamp
+        at = self._source.stamp(axis)  # before the document, which another thread may replace: never an old figure under a new stamp
         job = self._source.job(axis)
         document = self._source.document(axis)
-        self._busy.classes(remove="idle" if job is not None else "", add="" if job is not None else "idle")  # its place is kept
+        self._busy.classes(remove="idle" if job is not None else "", add="" if job is not None else "idle")  # keep its space
         if job is not None:
             waits = "" if job.running else "waits: " if not job.said else ""
             self._doing.set_text(f"{waits}{job.words} ({seconds_text(time.monotonic() - job.begun)}){self._wish.words}")
@@ -135,7 +135,7 @@ class StoryCard:
         self._buttons[act] = button
 
     def _fill(self, document: dict[str, Any] | None, able: bool) -> None:
-        """Fill the one button that is next, and show those that are sometimes next only then."""
+        """Highlight the button of the next action, and show the buttons that are only sometimes needed."""
         act, name = next_act(document) or ("", "")
         chosen = {"add": "named"}.get(act, act)
         if (chosen, name, able) == self._filled:
@@ -147,7 +147,7 @@ class StoryCard:
             if own in ("named", "keep"):
                 button.set_visibility(own == chosen)
             if own == "renew":
-                continue  # never the next act
+                continue  # never the next action
             filled = own == chosen and able
             button.props(add="unelevated" if filled else "outline", remove="outline" if filled else "unelevated")
 
@@ -155,7 +155,7 @@ class StoryCard:
         self._ask("add", self._named)
 
     def _ask(self, act: OrderKind, argument: str = "") -> None:
-        """Ask for it, or note it until what is being done has ended: the click may have been on its way when that began."""
+        """Give the order, or store it until the current one has ended: the click may have been sent before that one started."""
         if self._source.job(self._axis) is not None:
             self._wish.keep(self._axis, act, argument)
             return

@@ -1,4 +1,4 @@
-"""Several recordings, axes and models in one picture: what is drawn is chosen from all that is open."""
+"""Several recordings, axes and models in one figure; the user chooses from everything that is open."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from xy_sysid.report.story_together import Entry, together
 
 Models = Literal["newest", "every", "none"]
 MODELS: dict[Models, str] = {"newest": "newest models", "every": "every model", "none": "measured only"}
-FIRST = 4  # drawn before something is chosen
+FIRST = 4  # entries drawn before the user chooses
 READING = "One colour for each axis of a recording, dashes for its models. Bottom: where each model fails, in multiples of its noise floor."
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One axis that can be drawn: its key, its name for people, its story, and what grows whenever that changes."""
+    """One axis that can be drawn: its key, display name, story, and a counter that grows with each change."""
 
     key: str
     name: str
@@ -30,7 +30,7 @@ class Choice:
 
 
 class TogetherCard:
-    """The picture, and what is chosen for it; shown as soon as there are two to compare."""
+    """The figure and its choices; shown as soon as there are two axes to compare."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -44,7 +44,7 @@ class TogetherCard:
         self._card.set_visibility(False)  # until it is known that there are two
 
     async def refresh(self, found: list[Choice]) -> None:
-        """Draw again what has changed. found: what can be drawn."""
+        """Redraw what has changed. found: the axes that can be drawn."""
         self._card.set_visibility(len(found) > 1)
         if len(found) < 2:
             return
@@ -63,11 +63,11 @@ class TogetherCard:
 
 
 def choices(sources: list[Source]) -> list[Choice]:
-    """Every axis of every source that has a response; of what is live, with its first model: till then what lies above grows."""
+    """Every axis of every source that has a response; a live one once it has a first model, because the cards above still grow until then."""
     found = []
     for source in sources:
         for axis in source.axes():
-            stamp, document = source.stamp(axis), source.document(axis)  # the stamp first: see StoryCard
+            stamp, document = source.stamp(axis), source.document(axis)  # read the stamp first: see StoryCard
             if document is not None and document["measured"] is not None and (document["steps"] or not source.live):
                 title = "live" if source.live else source.title
                 found.append(Choice(f"{source.key}/{axis}", f"{title}, {axis}", document, stamp))
@@ -75,7 +75,7 @@ def choices(sources: list[Source]) -> list[Choice]:
 
 
 def steps_of(document: Mapping[str, Any], models: Models) -> tuple[int, ...]:
-    """Which steps of a story are drawn."""
+    """Indices of the story's steps that are drawn."""
     count = len(document["steps"])
     if models == "none" or not count:
         return ()

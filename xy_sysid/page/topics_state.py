@@ -1,4 +1,4 @@
-"""The state of the topics: which nodes run or are lost, and the history of the resonance. Pure; time is an argument."""
+"""The state of the topics: which nodes run or are lost, and the history of the resonance. Pure functions; time is an argument."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from xy_sysid.live.plain_messages import ArrayMessage, StatusMessage, topic_of
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 
-LOST = 4.0  # s without a word or a place in the graph after which a node is called lost
-HISTORY = 2000  # resonances remembered for each axis
-IDLE = "idle"  # what the diagnoser says of an axis without running work
+LOST = 4.0  # s without a message or an entry in the graph after which a node is called lost
+HISTORY = 2000  # resonance estimates kept for each axis
+IDLE = "idle"  # the diagnoser's status of an axis without running work
 KNOWN = ("excitation", "identifier", "ballscrew", "diagnoser", "recorder")
-COUPLING, COUPLED = "coupling", "coupling of "  # beginnings of the topic and of the status about two axes
-SPEAKER = {"streams": "identifier"}  # who sends a status that does not have its own name
-OFTEN = {"excitation", "ballscrew", "identifier"}  # say something at least once a second
+COUPLING, COUPLED = "coupling", "coupling of "  # prefixes of the topic and of the status about two axes
+SPEAKER = {"streams": "identifier"}  # sender of a status whose name differs from the node's
+OFTEN = {"excitation", "ballscrew", "identifier"}  # nodes that send a status at least once a second
 
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """One look at the resonance: seconds of data, Hz, its 95 % interval, the reference, and whether the alarm was on."""
+    """One resonance estimate: seconds of data, Hz, its 95 % interval, the reference, and whether the alarm was on."""
 
     seconds: float
     frequency: float
@@ -38,7 +38,7 @@ class Tracked:
 
 @dataclass(frozen=True, slots=True)
 class NodeState:
-    """One node as the page tells of it. level: 0 well, 1 of note, 2 wrong, 3 silent or lost."""
+    """One node as the page shows it. level: 0 well, 1 of note, 2 wrong, 3 silent or lost."""
 
     name: str
     level: int
@@ -48,9 +48,9 @@ class NodeState:
 
 @dataclass
 class TopicsState:
-    """The newest of everything; ``version`` grows with each message of its kind, so that a page knows when to draw again.
+    """The newest message of each kind; ``version`` counts the messages of a kind, so that a page knows when to redraw.
 
-    One thread writes and others read: whoever walks through a table copies it first. own_stop: the name under which this server publishes STOP.
+    One thread writes and others read: copy a table before iterating over it. own_stop: the name under which this server publishes STOP.
     """
 
     arrays: dict[str, ArrayMessage] = field(default_factory=dict)
@@ -65,12 +65,12 @@ class TopicsState:
     own_stop: str = ""
 
     def axes(self) -> tuple[str, ...]:
-        """Axes of which something was heard, in the order of their names."""
+        """Axes from which data were received, sorted by name."""
         ends = {self._axis(end) for kind, _, end in (topic.partition("/") for topic in list(self.arrays)) if kind != COUPLING}
         return tuple(sorted(ends | self._named()))
 
     def coupling(self) -> tuple[str, ArrayMessage | None]:
-        """The verdict on two axes that are driven at once, and the coupling by band; empty while there is none."""
+        """The verdict on two axes that are driven at the same time, and the coupling by band; empty before there is one."""
         said = next((status.message for name, status in list(self.statuses.items()) if name.startswith(COUPLED)), "")
         return said, next((array for topic, array in list(self.arrays.items()) if topic.startswith(f"{COUPLING}/")), None)
 
@@ -79,21 +79,21 @@ class TopicsState:
         return self.arrays.get(topic_of(kind, axis))
 
     def _named(self) -> set[str]:
-        """Axes that were named by a status or a story."""
+        """Axes that a status or a story has named."""
         return {name.removeprefix("axis ") for name in list(self.statuses) if name.startswith("axis ")} | set(self.stories)
 
     def _axis(self, end: str) -> str:
-        """The axis whose topics end so: joint-2 of frf/joint_2, as no topic can be called like the axis."""
+        """The axis for the last part of a topic name: joint-2 for frf/joint_2, because a topic name cannot contain every axis name."""
         return next((axis for axis in self._named() if topic_of("frf", axis) == f"frf/{end}"), end)
 
     def array(self, message: ArrayMessage) -> None:
-        """A topic of numbers."""
+        """Store a message with an array."""
         self.arrays[message.topic] = message
         self._changed(message.topic)
         self._changed(f"axis {self._axis(message.topic.partition('/')[2])}")
 
     def status(self, status: StatusMessage, now: float) -> None:
-        """One status of ``metrics`` or ``diagnosis``."""
+        """Store one status of ``metrics`` or ``diagnosis``."""
         self.statuses[status.name] = status
         self.when[SPEAKER.get(status.name, "identifier" if status.name.startswith("axis ") else status.name)] = now
         self._changed(status.name)
@@ -101,7 +101,7 @@ class TopicsState:
             self._track(status.name.removeprefix("axis "), status)
 
     def story(self, axis: str, text: str) -> str:
-        """A story document; what is wrong with it, or nothing."""
+        """Store a story document; returns what is wrong with it, or an empty text."""
         try:
             document = json.loads(text)
         except ValueError:
@@ -116,7 +116,7 @@ class TopicsState:
         return ""
 
     def doing(self, values: Mapping[str, str], now: float) -> None:
-        """What the diagnoser does for each axis now; values: of its status ``progress``, as ``axis x``: ``idle``."""
+        """Store the diagnoser's current work on each axis; values: of its status ``progress``, as ``axis x``: ``idle``."""
         for key, words in values.items():
             axis = key.removeprefix("axis ")
             words = "" if words == IDLE else words
@@ -125,13 +125,13 @@ class TopicsState:
                 self._changed(f"progress {axis}")
 
     def graph(self, names: set[str], now: float) -> None:
-        """Which nodes are in the namespace now."""
+        """Store the names of the nodes in the namespace."""
         for name in names:
             self.present[name] = now
         self._changed("graph")
 
     def nodes(self, now: float) -> list[NodeState]:
-        """Every node that belongs here and was ever there, with what it said last."""
+        """Every node of this system that was ever present, with its latest status."""
         found = []
         for name in [*KNOWN, *sorted(set(self.present) - set(KNOWN))]:
             seen = max(self.present.get(name, -math.inf), self.when.get(name, -math.inf))
@@ -169,25 +169,25 @@ class TopicsState:
             return 0.0
 
     def units(self, name: str) -> Units:
-        """Of input and output, as a status tells them: that of an axis, by the identifier, or of the excitation."""
+        """Units of input and output from a status: an axis (identifier), or the excitation."""
         told = self.values(name)
         return Units(told.get("input unit", USUAL.input), told.get("output unit", USUAL.output))
 
     def driving(self) -> bool:
-        """Whether the excitation says that it drives."""
+        """True if the excitation reports that it drives."""
         return self.values("excitation").get("state") in ("active", "stopping")
 
     def stopped_by_others(self) -> str:
-        """Who holds STOP, apart from this page's server, whose STOP Activate releases; empty if nobody."""
+        """Nodes that hold STOP, except this page's server (Activate releases its STOP); empty if none."""
         holders = [name for name in self.values("excitation").get("stop held by", "").split(", ") if name]
         return ", ".join(name for name in holders if name != self.own_stop)
 
     def at_rest_since(self, begun: float) -> bool:
-        """Whether the excitation itself has said after that time that it does not drive."""
+        """True if the excitation has reported after that time that it does not drive."""
         return self.when.get("excitation", -math.inf) > begun and self.values("excitation").get("state") in ("idle", "stopped")
 
     def alarms(self) -> list[str]:
-        """Sentences of axes whose resonance has moved."""
+        """Sentences about axes whose resonance has moved."""
         return [status.message for name, status in sorted(self.statuses.items()) if name.startswith("axis ") and status.level == 2]
 
     def _track(self, axis: str, status: StatusMessage) -> None:
@@ -216,7 +216,7 @@ def columns(message: ArrayMessage) -> dict[str, FloatArray]:
 
 
 def thinned(frequency: FloatArray, size: FloatArray, most: int) -> np.ndarray[Any, np.dtype[np.intp]]:
-    """At most about ``most`` lines that look the same on a log axis: of each narrow stretch the ends in size are kept."""
+    """Indices of about ``most`` lines at most, for a log axis: each narrow range keeps its smallest and largest value."""
     if frequency.size <= most:
         return np.arange(frequency.size)
     positive = np.maximum(frequency, frequency[frequency > 0].min() if (frequency > 0).any() else 1.0)

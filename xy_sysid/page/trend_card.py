@@ -1,4 +1,4 @@
-"""The trend of a fleet's table: what changed and why, and every parameter of an axis over time. The words are those of ``xy-sysid trend``."""
+"""The trend of a fleet's table: changes and causes, and every parameter of an axis over time, in the words of ``xy-sysid trend``."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from xy_sysid.fleets.history import Axis
     from xy_sysid.fleets.trends import Trend, Trends
 
-MOST = 4  # parameters that are drawn at a time
-DEEP = 2  # folders below the shelf that are looked into
+MOST = 4  # maximum number of parameters drawn at a time
+DEEP = 2  # folder levels below the shelf that are searched
 ABOUT = (
     "Each point is the parameter of one recording. Its 95 % interval holds the recording's own error and the spread between recordings. "
     "The vertical line is the first recording after a change, the shaded part the 95 % interval of that date."
@@ -29,7 +29,7 @@ OVER = "The same parameter of all axes, in per cent of its median before any cha
 
 
 class TrendCard:
-    """Tables of the shelf, and the trend of the one that is open; shown where the shelf has a table."""
+    """Tables of the shelf, and the trend of the open one; shown if the shelf has a table."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -54,7 +54,7 @@ class TrendCard:
         self._show(False)
 
     async def _compare(self) -> None:
-        """Work out the trend of the chosen table, in a process of its own, so that STOP and the page wait for nothing."""
+        """Compute the trend of the chosen table in a separate process, so that STOP and the page do not wait."""
         self._show(False)
         self._wait.set_visibility(True)
         self._open.disable()
@@ -88,7 +88,7 @@ class TrendCard:
             part.set_visibility(answered)
 
     def _turn(self) -> None:
-        """Another axis: the parameters that changed, or the first ones."""
+        """Select another axis: its changed parameters, or the first ones."""
         if self._found is None or self._axis.value is None:
             return
         own = trends_of(self._found, str(self._axis.value))
@@ -116,14 +116,14 @@ class TrendCard:
 
 
 def found(folder: Path) -> Trends:
-    """The trend of a table, in whatever process. Raises BadRecording or BadInput."""
+    """The trend of a table; may run in any process. Raises BadRecording or BadInput."""
     from xy_sysid.fleets.trends import trend
 
     return trend(folder)
 
 
 def key(axis: Axis) -> str:
-    """Name of an axis for people."""
+    """Display name of an axis."""
     return f"{axis.machine} {axis.axis}"
 
 
@@ -133,12 +133,12 @@ def trends_of(trends: Trends, name: str) -> Sequence[Trend]:
 
 
 def tables(shelf: Shelf) -> list[str]:
-    """Folders below the shelf that hold Parquet files only, as a fleet's table does, and the shelf itself as '.'."""
+    """Folders below the shelf that hold only Parquet files, as a fleet's table does; the shelf itself is '.'."""
     return sorted(str(folder.relative_to(shelf.folder)) for folder in _tables(shelf.folder, DEEP))
 
 
 def _tables(folder: Path, deep: int) -> Iterator[Path]:
-    """By names and kinds alone: no file is asked for more."""
+    """Find tables by names and file types alone; opens no file."""
     try:
         with os.scandir(folder) as entries:
             seen = [entry for entry in entries if not entry.name.startswith(".")]
@@ -153,7 +153,7 @@ def _tables(folder: Path, deep: int) -> Iterator[Path]:
 
 
 def find(shelf: Shelf, name: str) -> Path:
-    """The table of that name; raises BadInput for whatever is not in the list."""
+    """The table of that name; raises BadInput for a name that is not in the list."""
     if name not in tables(shelf):
         raise BadInput("table", repr(name[:80]), f"one of the list of {shelf.folder.name}", "Choose one.")
     return shelf.folder / name

@@ -1,4 +1,4 @@
-"""In which units one browser reads lengths and angles: a choice in the bar for each of them that an open source has."""
+"""The units in which one browser shows lengths and angles: one choice in the bar for each quantity that an open source has."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from nicegui import ui
 from xy_sysid.page.orders import Source
 from xy_sysid.units import CHOICES
 
-ABOVE = 7001  # the bar
+ABOVE = 7001  # z-index above the bar
 NAMES = {"m": "unit of lengths", "rad": "unit of angles"}
 
 
 class UnitsChoice:
-    """The choices; hidden where nothing is counted in them, as counts of an encoder, which are shown as they are."""
+    """The choices; hidden if no source has such a quantity, for example encoder counts, which are shown unchanged."""
 
     def __init__(self, wanted: Sequence[str]) -> None:
-        """wanted: what the address asks for."""
+        """wanted: the units from the address."""
         self._selects: dict[str, ui.select] = {}
         for kind, name in NAMES.items():
             options = list(CHOICES[kind])
@@ -27,7 +27,7 @@ class UnitsChoice:
             self._selects[kind] = made
 
     def refresh(self, sources: Sequence[Source]) -> None:
-        """Show the choices that mean something for what is open."""
+        """Show the choices that apply to the open sources."""
         documents = [source.document(axis) for source in sources for axis in source.axes()]
         outputs = {str(document["units"]["output"]) for document in documents if document}
         for kind, select in self._selects.items():
@@ -35,5 +35,5 @@ class UnitsChoice:
 
     @property
     def chosen(self) -> tuple[str, ...]:
-        """Those that are not the usual ones."""
+        """The choices that differ from the default."""
         return tuple(str(select.value) for kind, select in self._selects.items() if select.value != next(iter(CHOICES[kind])))

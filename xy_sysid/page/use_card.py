@@ -1,4 +1,4 @@
-"""The card *Use the model*: numbers to paste and files, as ``xy-sysid use`` gives them; in the demo, the path that is followed with them."""
+"""The card *Use the model*: numbers to paste and files, as ``xy-sysid use`` gives them; in the demo, also the following of a path."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class UseCard:
         self._text.set_visibility(False)
 
     def refresh(self) -> None:
-        """Show what is now."""
+        """Update the card."""
         documents = self._documents()
         for button in (self._numbers, self._files):
             button.set_enabled(bool(documents) and not self._working)
@@ -55,7 +55,7 @@ class UseCard:
             self._write(values)
 
     def _asked(self) -> tuple[dict[str, dict[str, Any]], Path | None, tuple[str, ...], float | None]:
-        """Models, the recording and how it is read, and the drive's limit."""
+        """Models, the recording and its reading options, and the drive's limit."""
         path, how = getattr(self._source, "path", None), getattr(self._source, "how", self._session.reading)
         return self._documents(), path, how.words, self._limit.value
 
@@ -106,6 +106,6 @@ class UseCard:
 
 
 def _lines(text: str) -> str:
-    """The command's tables as they are; its sentences, which are indented, wrap."""
+    """The command's tables unchanged; its indented sentences wrap."""
     made = [html.escape(line) for line in text.splitlines()]
     return "".join(f"<p>{line}</p>" if line.startswith("  ") and line.endswith(".") else f"<pre>{line}</pre>" for line in made)

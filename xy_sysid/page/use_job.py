@@ -1,4 +1,4 @@
-"""What ``xy-sysid use`` says of a model on the page: the command itself is asked, so that the page and the command have the same words."""
+"""The output of ``xy-sysid use`` for a model on the page: it runs the command itself, so that both have the same words."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from xy_sysid.page.beside import asked
 
 
 def used_text(documents: Mapping[str, Mapping[str, Any]], recording: Path | None, reading: tuple[str, ...], limit: float | None) -> str:
-    """The numbers to paste, as the command prints them. Raises BadInput with what it says. Takes seconds."""
+    """The numbers to paste, as the command prints them. Raises BadInput with the command's error. Takes seconds."""
     with tempfile.TemporaryDirectory() as folder:
         return _asked(Path(folder), documents, recording, (*reading, *_limit(limit)))
 
 
 def used_files(documents: Mapping[str, Mapping[str, Any]], recording: Path | None, reading: tuple[str, ...], limit: float | None) -> bytes:
-    """A ZIP with the exports of every axis, each in a folder of its own, of the numbers that ``used_text`` gives. Raises BadInput. Takes seconds."""
+    """A ZIP with a folder of exports for each axis, with the numbers of ``used_text``. Raises BadInput. Takes seconds."""
     packed = io.BytesIO()
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as pack:
         for axis, document in documents.items():

@@ -1,4 +1,4 @@
-"""Processes that do not hear Ctrl-C: it is for the one that began them, which ends them."""
+"""Processes that ignore Ctrl-C: their parent process handles it and ends them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from multiprocessing import resource_tracker
 
 @contextmanager
 def deaf() -> Iterator[None]:
-    """Threads and processes that begin in it never hear Ctrl-C."""
+    """Threads and processes that start in this context ignore Ctrl-C."""
     resource_tracker.ensure_running()  # started later, it would unblock the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
     try:

@@ -1,6 +1,6 @@
-"""One thread that fits while another hears data: requests go in, updates come out, in order.
+"""A thread that fits while another receives data: requests in, updates out, in order.
 
-The core knows no threads; this is the adapters' own.
+The core uses no threads; this one belongs to the adapters.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import threading
 from xy_sysid.live.fitter import LiveFitter, Update
 from xy_sysid.live.identifier import FitRequest
 
-MOST_WAITING = 64  # requests that may wait; beyond, the oldest is given up and counted (the bit-for-bit promise then ends)
+MOST_WAITING = 64  # waiting requests at most; above, the oldest is dropped and counted (results are then no longer bit-for-bit reproducible)
 
 
 class FitWorker:
-    """Runs a LiveFitter beside the data path."""
+    """Runs a LiveFitter in parallel with the data path."""
 
     def __init__(self, fitter: LiveFitter) -> None:
         self.skipped = 0
@@ -38,7 +38,7 @@ class FitWorker:
         self._requests.put(request)
 
     def done(self) -> list[Update]:
-        """Updates that are ready, in order; raises what stopped the thread, if something did."""
+        """Finished updates, in order; raises the error that stopped the thread, if any."""
         if self.failure is not None:
             raise self.failure
         found: list[Update] = []
@@ -49,7 +49,7 @@ class FitWorker:
                 return found
 
     def change(self, fitter: LiveFitter) -> None:
-        """Go on with another fitter, after the request under way."""
+        """Continue with another fitter, after the current request."""
         with self._lock:
             self._fitter = fitter
 
@@ -59,7 +59,7 @@ class FitWorker:
         return self._fitter
 
     def close(self, timeout: float = 5.0) -> list[Update]:
-        """Finish what waits and end the thread; the updates that were still to come."""
+        """Finish waiting requests and end the thread; returns the remaining updates."""
         self._requests.put(None)
         self._thread.join(timeout)
         return self.done()

@@ -1,6 +1,6 @@
-"""One more process that works while this one does, as Python lets one thread at a time calculate.
+"""A process that works in parallel with this one, because only one Python thread calculates at a time.
 
-It is begun early and imports what it needs meanwhile. Should it die, as of an error, its work is done here: answer and error are the same.
+It starts early and does its imports meanwhile. If it dies, for example of an error, its work is done here, with the same result or error.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from xy_sysid.processes.deaf import deaf
 
 
 class Helper:
-    """``begin`` a function of a module with its arguments and get what waits for its result; on a computer with one core it is made then."""
+    """``begin`` starts a function and returns a function that waits for its result; with a single core, that call does the work."""
 
     def __init__(self, module: str) -> None:
-        """module: what the process imports at once."""
+        """module: imported by the process at its start."""
         self._ended = False
         self._asks: ThreadPoolExecutor | None = None
         if os.environ.get("NUMBA_NUM_THREADS") == "1" or os.cpu_count() == 1:
@@ -44,7 +44,7 @@ class Helper:
             self._asks.shutdown(cancel_futures=True)
 
     def begin(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-        """One after the other, in the order of the calls; the result raises what the function raises."""
+        """Start a call; calls run one after the other. The returned function gives the result, or raises the call's error."""
         if self._asks is None:
             return lambda: function(*arguments)
         return self._asks.submit(self._ask, function, arguments).result
@@ -60,7 +60,7 @@ class Helper:
 
 
 def serve(pipe: Connection, module: str) -> None:
-    """What the process does: work in, results out, until its parent process has ended."""
+    """Main loop of the process: work in, results out, until its parent process has ended."""
     threading.Thread(target=importlib.import_module, args=(module,), daemon=True).start()
     try:
         while True:

@@ -1,4 +1,4 @@
-"""From a run file (which nodes, with what) to the processes to start, or to what one node is told; nothing is started and no file is read here."""
+"""From a run file to the list of processes, or to the settings of one node; it starts nothing and reads no file."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ NAMESPACE = "/xy"
 
 @dataclass(frozen=True, slots=True)
 class ProcessSpec:
-    """One process to start and watch.
+    """One process to start and monitor.
 
     ``env`` is added to the environment. ``stop_rank``: the lowest is stopped first. ``restart``: start it again when it
-    dies with an error. ``optional``: the others go on without it; otherwise its end ends everything.
+    dies with an error. ``optional``: the others continue without it; otherwise its end stops all.
     """
 
     name: str
@@ -55,10 +55,10 @@ class ProcessSpec:
 
 
 def plan(text: str, where: str, folder: Path) -> list[ProcessSpec]:
-    """The processes that a run file asks for, in the order to start them: who listens first, who drives last.
+    """The processes of a run file in start order: receivers first, the drive last.
 
-    ``text`` is the file's content, ``where`` its name for messages, ``folder`` what its paths are relative to.
-    Raises BadInput that names the value, what is allowed and, for an unknown name, the nearest spelling.
+    ``text`` is the file's content, ``where`` its name for messages, ``folder`` the base of its relative paths.
+    Raises BadInput that names the value, the allowed ones and, for an unknown name, the nearest spelling.
     """
     document = load(text, where)
     if not isinstance(document, dict) or not document.get("nodes"):
@@ -110,7 +110,7 @@ def _check(given: Mapping[str, Any], known: Mapping[str, tuple[type, str]], wher
 
 
 def parameter_files(text: str, where: str) -> list[tuple[str, dict[str, str]]]:
-    """Each parameter file that a run file names, with the kinds of the nodes that read it, so that it can be checked first."""
+    """Each parameter file in a run file, with the kinds of the nodes that read it, so that it can be checked first."""
     found: dict[str, dict[str, str]] = {}
     for entry in load(text, where)["nodes"]:
         if "params_file" in entry:
@@ -119,30 +119,30 @@ def parameter_files(text: str, where: str) -> list[tuple[str, dict[str, str]]]:
 
 
 def is_run_file(text: str, where: str) -> bool:
-    """Whether it lists nodes, and is no ROS parameter file. Raises BadInput for what is no YAML."""
+    """True if the text lists nodes, and is not a ROS parameter file. Raises BadInput for invalid YAML."""
     document = load(text, where)
     return isinstance(document, dict) and "nodes" in document
 
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What a run file tells one node: its parameters by dotted name, its namespace and its remappings."""
+    """The settings of one node in a run file: its parameters by dotted name, its namespace and its remappings."""
 
     parameters: Mapping[str, Any]
     namespace: str = NAMESPACE
     remap: Mapping[str, str] = field(default_factory=dict)
 
     def topic(self, name: str) -> str:
-        """The full name of a topic that the node calls so."""
+        """The full name of a topic from the node's own name for it."""
         name = self.remap.get(name, name)
         return name if name.startswith("/") else f"{self.namespace.rstrip('/')}/{name}"
 
 
 def told(kind: str, text: str, where: str, read: Callable[[str], str]) -> Told:
-    """What a run file tells its one node of a kind, its own parameters over those of its parameter file.
+    """The settings of the only node of a kind in a run file; its own parameters override those of its parameter file.
 
-    read: the text of a parameter file, by the name that the run file gives it
-    Raises BadInput for a file that holds none of the kind, or several.
+    read: returns the text of a parameter file, from its name in the run file
+    Raises BadInput for a run file with no node of the kind, or with several.
     """
     plan(text, where, Path())
     document = load(text, where)

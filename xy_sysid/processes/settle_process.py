@@ -1,4 +1,4 @@
-"""A process that decides the steps of a walk to a settled diagnosis, so that the process that receives data never waits for a design."""
+"""A process that decides the steps towards a settled diagnosis, so that the process that receives data never waits for a design."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from xy_sysid.files.effects import library
 from xy_sysid.files.walk import plan_of, run_of, step_document
 from xy_sysid.story.attempt import Attempt
 
-NICE = 10  # of the process: whoever hears data goes first
+NICE = 10  # niceness of the process: receiving data has priority
 
 
 @dataclass(frozen=True, slots=True)
 class DecisionNews:
-    """part: of the design that is done; step: the document of the step that was decided; problem: why none was."""
+    """part: finished fraction of the design; step: document of the decided step; problem: why there is none."""
 
     part: float = 0.0
     step: dict[str, Any] | None = None
@@ -29,7 +29,7 @@ class DecisionNews:
 
 
 class Decider:
-    """ask(bag) for each recording in turn, then ``news`` until it brings a step or a problem."""
+    """ask(bag) for each recording in turn, then ``news`` until it returns a step or a problem."""
 
     def __init__(self, plan: dict[str, Any], effect_files: tuple[str, ...] = ()) -> None:
         """plan: its document."""
@@ -44,11 +44,11 @@ class Decider:
         there.close()
 
     def ask(self, bag: Path) -> None:
-        """Decide with one more recording."""
+        """Decide after one more recording."""
         self._pipe.send(str(bag))
 
     def news(self) -> DecisionNews | None:
-        """What has come since the last call, the newest of it; None if nothing has."""
+        """The newest report since the last call; None without one."""
         found: DecisionNews | None = None
         try:
             while self._pipe.poll():
@@ -65,7 +65,7 @@ class Decider:
 
 
 def work(pipe: Connection, told: dict[str, Any], effect_files: tuple[str, ...]) -> None:
-    """What the process does: bags in, steps out, until its parent process has ended."""
+    """Main loop of the process: bags in, steps out, until its parent process has ended."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.nice(NICE)
     from xy_sysid.experiment_design.walk import step

@@ -1,6 +1,6 @@
 """Starts nodes as processes, watches them, and stops them in an order that leaves the machine at zero volts.
 
-For machines without ``ros2 launch``. A node that ends ends all the others, unless it may be restarted or is optional.
+For machines without ``ros2 launch``. When a node ends, all others are stopped, unless it may be restarted or is optional.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ GRACE = ((signal.SIGINT, 4.0), (signal.SIGTERM, 2.0), (signal.SIGKILL, 2.0))
 RESTARTS, RESTART_SPAN, RESTART_PAUSE = 5, 60.0, 0.5
 """So often in so many seconds a process is started again; after that its death counts."""
 LINE_LIMIT = 1 << 16
-PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"  # of the middleware: how soon a lost packet is asked for
+PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"  # middleware profile that sets how soon a lost packet is requested again
 
 # Ask the kernel to interrupt the node when the starter itself is killed, then become the node.
 FOLLOW = (
@@ -57,7 +57,7 @@ def load(name: str) -> list[ProcessSpec]:
 
 
 def _network(env: Sequence[tuple[str, str]], folder: Path, where: str) -> Iterator[tuple[str, str]]:
-    """The environment with the full path of the network profile: beside the run file, or the one of the package. One that is set already stays."""
+    """The environment with the path of the network profile: next to the run file, or from the package. A variable that is set already is kept."""
     for key, value in env:
         if key != PROFILE:
             yield key, value
@@ -78,8 +78,8 @@ def run(
 ) -> int:
     """Starts the processes and returns when all have ended: 0 in order, 1 after a death, 130 after Ctrl-C, 143 after SIGTERM.
 
-    ``say`` takes each line for people (default: standard output), ``heard`` each line that a process wrote, with its
-    name; ``enough`` is asked ten times a second whether it is time to stop.
+    ``say`` receives each line for the user (default: standard output), ``heard`` each line that a process wrote, with its
+    name; ``enough`` is called ten times a second and returns whether to stop.
     """
     crew = _Crew(say or _print, heard or (lambda name, line: None), grace)
     with _signals() as caught:
@@ -102,7 +102,7 @@ def _print(line: str) -> None:
 
 @contextmanager
 def _signals() -> Iterator[list[int]]:
-    """Collects Ctrl-C and SIGTERM instead of dying of them; a second Ctrl-C doesn't cut the orderly stop short."""
+    """Collects Ctrl-C and SIGTERM instead of exiting; a second Ctrl-C does not shorten the orderly stop."""
     caught: list[int] = []
 
     def note(number: int, _frame: FrameType | None) -> None:
@@ -125,7 +125,7 @@ class _Member:
 
 
 class _Crew:
-    """The processes that run, and what they say."""
+    """The running processes and their output."""
 
     def __init__(self, say: Callable[[str], None], heard: Callable[[str, str], None], grace: Sequence[tuple[signal.Signals, float]]) -> None:
         self.say, self.heard, self.grace = say, heard, grace
@@ -164,7 +164,7 @@ class _Crew:
         return self.ended or not (self.members or self.due)
 
     def listen(self, seconds: float) -> None:
-        """Passes on what was said, for so long at most, and looks who has ended."""
+        """Forward the output for at most this many seconds, and check which processes have ended."""
         if self.selector.get_map():
             for key, _ in self.selector.select(seconds):
                 self._read(key.data)
@@ -178,7 +178,7 @@ class _Crew:
             self.start(entry[1], entry[2])
 
     def stop(self) -> None:
-        """Stops everybody, rank after rank, each first asked and then made to."""
+        """Stop all processes, rank after rank; each is first asked, then killed."""
         self.ended, self.due = True, []
         for rank in sorted({member.spec.stop_rank for member in self.members}):
             for number, seconds in self.grace:
@@ -214,7 +214,7 @@ class _Crew:
         self.heard(member.spec.name, text)
 
     def _bury(self, member: _Member) -> None:
-        """Says the last words of a process that has ended, and decides what its end means."""
+        """Print the remaining output of an ended process, and decide whether to restart it or stop the others."""
         pipe = _pipe(member.process)
         while chunk := pipe.read(LINE_LIMIT):
             member.rest += chunk
@@ -251,5 +251,5 @@ def _why(code: int) -> str:
 
 
 def main(file: Path | str) -> int:
-    """What ``xy-sysid run`` does: the nodes of a run file, until one ends or Ctrl-C."""
+    """Implements ``xy-sysid run``: the nodes of a run file, until one ends or Ctrl-C."""
     return run(load(str(file)))

@@ -1,7 +1,7 @@
 """A process that performs jobs on stories, so that the process that receives data never waits for a fit; cancelling ends the process.
 
-It is started at once, so that the first job need not wait for it, and stays, idle, for the next ones. The core knows no processes; this is
-the adapters' own.
+It starts at once, so that the first job need not wait for it, and stays idle for the next ones. The core uses no processes; this one belongs
+to the adapters.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from xy_sysid.story.attempt import Attempt
 from xy_sysid.story.document import document
 from xy_sysid.story.story import Story
 
-NICE = 10  # of the worker: whoever hears data goes first
-POLL = 0.1  # s after which it is looked whether a job was cancelled
+NICE = 10  # niceness of the worker: receiving data has priority
+POLL = 0.1  # s between two checks whether a job was cancelled
 
 
 @dataclass(frozen=True, slots=True)
 class JobNews:
-    """What a job has come to: a step (``text`` is the story's document in JSON), or its end, with the problem if it failed."""
+    """A report of a job: a step (``text`` is the story's document in JSON), or its end, with the problem if it failed."""
 
     job: int
     doing: str
@@ -54,13 +54,13 @@ class StoryWorker:
         self._thread.start()
 
     def ask(self, job: Job) -> int:
-        """Begin a job; its number."""
+        """Start a job; returns its number."""
         self._number += 1
         self._jobs.put((self._number, job))
         return self._number
 
     def news(self) -> list[JobNews]:
-        """What has come since the last call, of the newest job only."""
+        """Reports of the newest job since the last call."""
         found: list[JobNews] = []
         while True:
             try:
@@ -71,7 +71,7 @@ class StoryWorker:
                 found.append(item)
 
     def cancel(self) -> None:
-        """End the job under way, if there is one; nothing more is heard of it."""
+        """Cancel the current job, if any; it sends no more reports."""
         self._number += 1
 
     def close(self) -> None:
@@ -104,7 +104,7 @@ class StoryWorker:
             process.join(2.0)
 
     def _ended(self, number: int, pipe: Connection) -> bool:
-        """Pass on what comes in the next moment; whether it was the last word."""
+        """Forward reports that arrive within a moment; returns True after the last one."""
         if not pipe.poll(POLL):
             return False
         news: JobNews = pipe.recv()
@@ -122,7 +122,7 @@ def _begin(effect_files: tuple[str, ...]) -> tuple[BaseProcess, Connection]:
 
 
 def work(pipe: Connection, effect_files: tuple[str, ...]) -> None:
-    """What the process does: jobs in, news out, until its parent process has ended."""
+    """Main loop of the process: jobs in, reports out, until its parent process has ended."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.nice(NICE)
     try:

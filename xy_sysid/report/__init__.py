@@ -1,10 +1,10 @@
 """Reports: a recording on one self-contained HTML page.
 
-axis_report:    what is known of one axis, from all that stands upstream
-study:          the study of the paper, parameter by parameter, and what its tables say (``tables``)
-words, captions, remarks, story_words: what is said
-figures, signals, story_*: what is drawn, in the colours of ``theme``
+axis_report:    everything that is known about one axis, from all upstream packages
+study:          the study of the paper, parameter by parameter, and its tables (``tables``)
+words, captions, remarks, story_words: the sentences
+figures, signals, story_*: the figures, in the colours of ``theme``
 parts, sheet:   pieces of a page, and the page around them
-report_page, study_page: the two pages; written: a report of a recording, as command and notebook ask for it
+report_page, study_page: the two pages; written: a report of a recording, as the command and notebooks request it
 plots, notebook: single pictures, and results as a notebook shows them
 """

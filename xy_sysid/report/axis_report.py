@@ -1,7 +1,7 @@
 """The content of a report for one axis: response, fits with verdicts, and missing effects.
 
-Transfer functions see the first two thirds of the recording and are tested on the last;
-the story's models see two thirds that are spread over it.
+Transfer functions are fitted to the first two thirds of the recording and tested on the last third;
+the story's models are fitted to two thirds that are spread over the recording.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from xy_sysid.story.document import document
 from xy_sysid.story.story import tell as whole_story
 
 HELD_OUT = 1.0 / 3.0  # of the recording, as in every story
-LONGEST = 600.0  # s of data for the story: more would not improve it and take memory (2 MB a second at 2 kHz)
-MOST_SENT = 1 << 27  # bytes of positions of a recording that another process gets a copy of
+LONGEST = 600.0  # s of data for the story: more would not improve it and needs memory (2 MB per second at 2 kHz)
+MOST_SENT = 1 << 27  # bytes of positions; a longer recording is not copied to another process
 STAGES = ("response and fits", "diagnosis")
 
 Tell = Callable[[str, str], None]
-Begin = Callable[..., Callable[[], Any]]  # begins a function of this module with its arguments, and gives what waits for the result
+Begin = Callable[..., Callable[[], Any]]  # starts a function of this module with its arguments; returns a function that waits for its result
 
 
 @dataclass(frozen=True, slots=True)
 class AxisReport:
-    """One axis.
+    """The report content of one axis.
 
     study: excitation and motion of the whole recording, response and fits of its first two thirds
-    verdicts: on the ML fit, None without one; story: the document of ``story.document``, None if ``problem`` says why
-    speed: rms of the measured speed, output unit / s; note: what a reader should know about orders and length
+    verdicts: on the ML fit, None without an ML fit; story: the document of ``story.document``, None if ``problem`` gives the reason
+    speed: rms of the measured speed, output unit / s; note: remarks for the reader on orders and length
     """
 
     study: AxisStudy
@@ -55,13 +55,13 @@ class AxisReport:
 
     @property
     def axis(self) -> str:
-        """Its name."""
+        """The name of the axis."""
         return self.study.axis
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """How a report is made. period: of the input, samples (0: none, None: found); budget: s of processor time for the diagnosis of each axis."""
+    """Options of a report. period: of the input, samples (0: none, None: found); budget: s of processor time for the diagnosis of each axis."""
 
     settings: IdentifierSettings = field(default_factory=IdentifierSettings)
     period: int | None = 0
@@ -70,16 +70,16 @@ class Wanted:
 
 
 def later(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-    """Begin nothing: the result is made when it is asked for."""
+    """Do not start yet: the returned function computes the result when it is called."""
     return lambda: function(*arguments)
 
 
 def axis_reports(
     recording: Recording, axes: Sequence[str], wanted: Wanted, tell: Tell = lambda axis, stage: None, begin: Begin = later
 ) -> dict[str, AxisReport]:
-    """All that can be said about each of these axes, by name.
+    """The reports of these axes, by name.
 
-    tell: called with an axis and each of STAGES as it begins; begin: makes the fits of all axes while the stories are told, if it can
+    tell: called with an axis and each of STAGES as the stage starts; begin: starts the fits of all axes, in parallel with the stories if possible
     """
     begin = begin if recording.position.nbytes < MOST_SENT else later
     fits = {}
@@ -90,7 +90,7 @@ def axis_reports(
 
 
 def _report(recording: Recording, axis: str, wanted: Wanted, tell: Tell, fits: Callable[[], Any]) -> AxisReport:
-    """All that can be said about one axis; what cannot is said in words."""
+    """The report of one axis; a part that cannot be computed has a sentence instead."""
     runs = recording.stretches(axis) if len(recording) else ()
     seconds, notes = sum(run.seconds for run in runs), [text.partition(": ")[2] for text in recording.left_out((axis,))]
     if seconds > LONGEST:
@@ -111,7 +111,7 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
     training, unseen = split(recording, HELD_OUT)
     drive, moved = excitation(recording, axis), motion(recording, axis)
     try:
-        with np.errstate(all="ignore"):  # what overflows ends in a figure that the verdicts judge
+        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts reject
             studied = replace(study_axis(training, axis, settings, period, refit=False), excitation=drive, motion=moved)
             if not studied.fits or studied.frf is None:
                 return studied, None
@@ -125,13 +125,13 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
 
 
 def told(recording: Recording, axis: str, wanted: Wanted) -> Mapping[str, Any]:
-    """The document of the whole story of an axis, of at most LONGEST. Raises BadInput for samples that cannot be judged."""
+    """The document of the full story of an axis, from at most LONGEST seconds. Raises BadInput for samples that cannot be analysed."""
     clock = never if wanted.budget == math.inf else time.process_time
     return document(whole_story(_stretches(recording, axis), wanted.library, clock, wanted.budget))
 
 
 def _stretches(recording: Recording, axis: str) -> tuple[Run, ...]:
-    """All stretches of an axis as ``diagnose`` has them, of at most LONGEST together. Raises BadInput where they hold one move only."""
+    """All runs of an axis, as ``diagnose`` uses them, at most LONGEST seconds in total. Raises BadInput if they hold one move only."""
     runs = recording.stretches(axis)
     several_moves(runs)
     found, left = [], LONGEST

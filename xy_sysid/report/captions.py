@@ -1,4 +1,4 @@
-"""Captions of the figures, and alternative text for people who cannot see them."""
+"""Captions of the figures, and alternative text for screen readers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ COEFFICIENTS = (
 
 
 def summary(one: AxisStudy) -> str:
-    """One line on top of the page."""
+    """The summary line at the top of the page."""
     if not one.fits:
         return f"Axis {one.axis}: {one.problem}"
     ml = one.fits["ML"]
@@ -102,14 +102,14 @@ def coherence(responses: Mapping[str, FrequencyResponse], least: float) -> str:
 
 
 def fit(axis: str, fits: Mapping[str, Fit]) -> str:
-    """What figure 6 shows of one axis."""
+    """The caption of figure 6 for one axis."""
     each = ", ".join(f"{name} {number(one.error_cost, 3)} %" for name, one in fits.items())
     banded = "; shaded: 95 % band of the ML fit, widened by its error beyond noise" if math.isfinite(fits["ML"].misfit) else ""
     return f"Axis {axis}: fits over the measured response{banded}; relative error {each}."
 
 
 def change(axis: str, one: BeforeAfter) -> str:
-    """What figure 7 shows of one axis."""
+    """The caption of figure 7 for one axis."""
     each = ", ".join(f"{s.name} {interval_text(s.value, s.low, s.high, 'Hz')}" for s in one.shifts)
     return f"Axis {axis}: the pair in {one.before_name} and {one.after_name}; shift: {each or 'unknown'}."
 

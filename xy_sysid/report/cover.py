@@ -1,4 +1,4 @@
-"""Head of a report and foot of its printed pages: title, machine, author, date."""
+"""Head of a report and footer of its printed pages: title, machine, author, date."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pathlib import Path
 from xy_sysid.fleets.naming import Names, date_of, date_within, name_of
 from xy_sysid.samples.recording import Recording
 
-BETWEEN = " · "  # words at the foot of a page
+BETWEEN = " · "  # separator in the footer
 
 
 @dataclass(frozen=True, slots=True)
 class Cover:
-    """title: of the page; machine, author, recorded: empty if unknown; written: the day of the report."""
+    """title: of the page; machine, author, recorded: empty if unknown; written: the date of the report."""
 
     title: str
     machine: str = ""
@@ -27,13 +27,13 @@ class Cover:
 
     @property
     def lines(self) -> tuple[tuple[str, str], ...]:
-        """(what, value) of all that is known."""
+        """(label, value) of everything that is known."""
         every = (("Machine", self.machine), ("Author", self.author), ("Recorded", self.recorded), ("Report written", self.written))
         return tuple((what, value) for what, value in every if value)
 
     @property
     def foot(self) -> str:
-        """One line for the foot of each printed page."""
+        """The footer line of each printed page."""
         return BETWEEN.join(text for text in (self.title, self.machine, self.author, self.recorded or self.written) if text)
 
     @property
@@ -44,10 +44,10 @@ class Cover:
 
 
 def cover_of(recording: Recording, said: Cover, sources: Sequence[Path], today: date) -> Cover:
-    """The cover with what was said, and for the rest what the recording tells.
+    """The cover: the given entries, completed from the recording.
 
-    Machine: from the meta data of the recording. Date: what was said, else the recording's clock, else the name of the first file.
-    Raises BadInput for a date that is none.
+    Machine: default from the metadata of the recording. Date: the given one, else the recording's clock, else the name of the first file.
+    Raises BadInput for an invalid date.
     """
     when = date_of(said.recorded) if said.recorded else date_within(recording) or next((name_of(path, Names()).date for path in sources), None)
     return Cover(
@@ -60,11 +60,11 @@ def cover_of(recording: Recording, said: Cover, sources: Sequence[Path], today: 
 
 
 def shown(when: datetime) -> str:
-    """A day, with the time of day where one is known: 2026-03-03 14:30 UTC."""
+    """A date, with the time of day if it is known: 2026-03-03 14:30 UTC."""
     at = when.astimezone(UTC)
     return f"{at:%Y-%m-%d}" if (at.hour, at.minute, at.second) == (0, 0, 0) else f"{at:%Y-%m-%d %H:%M} UTC"
 
 
 def css_string(text: str) -> str:
-    """The text as a string of CSS that cannot end the string or the element it stands in."""
+    """The text as a CSS string literal that cannot close the string or the element around it."""
     return '"' + re.sub(r'[\x00-\x1f"\\<>&\x7f-\x9f]', lambda found: f"\\{ord(found.group()):x} ", text) + '"'

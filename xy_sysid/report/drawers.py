@@ -1,4 +1,4 @@
-"""Pictures of stories, drawn in other processes while the next story is computed, because Matplotlib blocks the interpreter."""
+"""Draws the figures of stories in other processes while the next story is computed. Matplotlib would block this process's interpreter."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ Drawn = dict[str, dict[str, bytes]]
 
 
 class Drawers:
-    """ask(name, document) for the pictures of each axis, then drawn(name) for what they are, by title and kind. Raises MissingExtra at once.
+    """Call ask(name, document) to start drawing an axis, then drawn(name) for its figures by title and kind. Raises MissingExtra at once.
 
-    kinds: svg, pdf, csv; columns: of a journal, 1 or 2; share: processes, each of which draws a part of every story
+    kinds: svg, pdf, csv; columns: of a journal, 1 or 2; share: number of processes, each of which draws a part of every story
     """
 
     def __init__(self, kinds: Sequence[str], columns: int, share: int) -> None:
@@ -36,13 +36,13 @@ class Drawers:
         self._pool.terminate()
 
     def ask(self, name: str, document: Document) -> None:
-        """Begin to draw."""
+        """Start drawing."""
         titles = list(drawings(document))
         parts = [titles[first :: self._share] for first in range(self._share)]
         self._asked[name] = titles, [self._pool.apply_async(written, (document, self._kinds, self._columns, part)) for part in parts]
 
     def drawn(self, name: str) -> Drawn:
-        """All pictures, as soon as they are there."""
+        """All figures; waits until they are drawn."""
         titles, parts = self._asked[name]
         found: dict[str, Any] = {title: content for part in parts for title, content in part.get().items()}
         return {title: found[title] for title in titles}

@@ -1,4 +1,4 @@
-"""The numbers of a figure as a table, to be drawn again elsewhere."""
+"""The numbers of a figure as a table, so that it can be plotted elsewhere."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def table(figure: Mapping[str, Any], start: str = "") -> str:
 
 
 def _title(layout: Mapping[str, Any], letter: str, axis: str) -> str:
-    """Of the axis, or of the one that it is matched to; the lowest of shared axes carries the title."""
+    """The title of the axis, or of the axis that it is matched to; among shared axes the lowest has the title."""
     own = layout.get(f"{letter}axis{axis[1:]}") or {}
     text = (own.get("title") or {}).get("text")
     if not text:
@@ -45,7 +45,7 @@ def _title(layout: Mapping[str, Any], letter: str, axis: str) -> str:
 
 
 def _row(values: Any) -> Sequence[Any]:
-    """Plotly writes numbers as lists or as typed bytes."""
+    """A row of numbers; Plotly writes them as lists or as typed bytes."""
     if isinstance(values, Mapping):
         made = np.frombuffer(base64.b64decode(values["bdata"]), dtype=np.dtype(values["dtype"]))
         return list(made.tolist())

@@ -1,4 +1,4 @@
-"""Figures 2 to 7 of the paper's study: numbers in, a Plotly figure out. One function a figure; no files, no fits."""
+"""Figures 2 to 7 of the paper's study: numbers in, a Plotly figure out. One function per figure; no files, no fits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UNCERTAIN = "ML"  # the fit whose parameters have a covariance
 
 
 def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
-    """Figure 2: excerpt in time, distribution beside the normal one of the same rms, power spectral density with band edges."""
+    """Figure 2: excerpt in time, distribution compared with the normal one of equal rms, power spectral density with band edges."""
     figure = rows(3, shared=False, gap=0.13)
     for number, (axis, one) in enumerate(inputs.items()):
         colour = axis_colour(number)
@@ -61,7 +61,7 @@ def excitation_figure(inputs: Mapping[str, Excitation], unit: str) -> go.Figure:
 
 
 def position_figure(outputs: Mapping[str, Motion], unit: str) -> go.Figure:
-    """Figure 3: the measured output of each axis over time, and the straight line of its drift."""
+    """Figure 3: the measured output of each axis over time, and a straight line for its drift."""
     scale, shown = readable(unit)
     figure = rows(len(outputs), shared=True, gap=0.06)
     for number, (axis, one) in enumerate(outputs.items()):
@@ -148,7 +148,7 @@ def coherence_figure(responses: Mapping[str, FrequencyResponse], least: float) -
 
 
 def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
-    """Figure 6, of one axis: the fits over the measurement in magnitude and phase, and below the relative error per line."""
+    """Figure 6, for one axis: magnitude and phase of the fits and the measurement; below, the relative error per line."""
     figure = rows(3, shared=True, gap=0.05, heights=[0.38, 0.28, 0.34])
     one = next(iter(fits.values()))
     reference = phase_of(one.measured)
@@ -186,7 +186,7 @@ def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
 
 
 def _model_band(figure: go.Figure, fit: Fit, level: FloatArray, phase: FloatArray) -> None:
-    """95 % band of a fitted response over its magnitude and phase; nothing where it is not known."""
+    """Draw the 95 % band of a fitted response in magnitude and phase; draw nothing if the band is unknown."""
     sigma = model_band(fit)
     if not bool(np.isfinite(sigma.magnitude).all() and np.isfinite(sigma.phase).all()):
         return
@@ -197,7 +197,7 @@ def _model_band(figure: go.Figure, fit: Fit, level: FloatArray, phase: FloatArra
 
 
 def pair_figure(change: BeforeAfter) -> go.Figure:
-    """Figure 7, of one axis: the pair before and after, measured and fitted, with intervals; below the shift in Hz."""
+    """Figure 7, for one axis: the pair before and after, measured and fitted, with intervals; below, the shift in Hz."""
     shifts = change.shifts
     heights = [0.47, 0.28, 0.25] if shifts else [0.6, 0.4]
     figure = rows(len(heights), shared=False, gap=0.11, heights=heights)
@@ -256,13 +256,13 @@ def pair_figure(change: BeforeAfter) -> go.Figure:
 
 
 def coherence_bottom(responses: Mapping[str, FrequencyResponse]) -> float:
-    """Where the axis of figure 5 begins: 0, or a round figure below every line when all are coherent."""
+    """Lower end of figure 5's axis: 0, or a round number below every line if all are coherent."""
     lowest = min((float(np.min(frf.coherence)) for frf in responses.values()), default=0.0)
     return float(np.floor(lowest * 10 - 0.5) / 10) if lowest > 0.5 else 0.0
 
 
 def _zoom(pairs: list[Pair]) -> tuple[float, float]:
-    """Hz around all antiresonances and resonances: room to each side, at least a third of the frequency."""
+    """(lowest, highest) Hz around all antiresonances and resonances, with a margin of at least a third of the frequency on each side."""
     found = [item.value for pair in pairs for item in (pair.antiresonance, pair.resonance) if item is not None]
     if not found:
         return 0.0, 1.0

@@ -1,4 +1,4 @@
-"""Every picture of a story by name, for a folder of figures."""
+"""Every figure of a story by name, for a folder of figures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sysid.report.story_parts import Document, legend_name, pictured, words
 from xy_sysid.report.vector import vectors
 
 FAILS: tuple[By, ...] = ("frequency", "speed", "position", "time")
-OF_A_STEP = {  # what a picture shows, in the name of its file: the function that draws it
+OF_A_STEP = {  # file name -> function that draws the figure of a step
     "frequency_response": draw.bode,
     "coherence": draw.coherence,
     "error_by_frequency": draw.residual,
@@ -31,7 +31,7 @@ OF_A_STEP = {  # what a picture shows, in the name of its file: the function tha
 
 
 def drawings(document: Document) -> dict[str, Callable[[], go.Figure]]:
-    """How to draw every picture of a story, by name: of the rigid model where it fails, of the newest model, and of the way between them."""
+    """Functions that draw every figure of a story, by name: where the rigid model fails, the newest model, and the progress between them."""
     made: dict[str, Callable[[], go.Figure]] = {f"rigid_model_fails_by_{by}": partial(_fails, document, by, 0) for by in FAILS}
     if len(document["steps"]) > 1:
         made |= {f"last_model_fails_by_{by}": partial(_fails, document, by) for by in FAILS}
@@ -45,7 +45,7 @@ def drawings(document: Document) -> dict[str, Callable[[], go.Figure]]:
 
 
 def _fails(document: Document, by: By, step: int | None = None) -> go.Figure:
-    """Where a step fails, as the page shows it, with a legend that names the model: in a folder no words stand beside it."""
+    """Where a step fails, as the page shows it, with the model's name in the legend because a folder has no captions."""
     figure, shown = failure(document, by, step), pictured(document, step)
     if figure.data and shown is not None:
         figure.data[-1].name = legend_name("model", shown) if shown["effects"] else words(str(shown["label"]))
@@ -54,12 +54,12 @@ def _fails(document: Document, by: By, step: int | None = None) -> go.Figure:
 
 
 def gallery(document: Document) -> dict[str, go.Figure]:
-    """Every picture of a story by name."""
+    """Every figure of a story by name."""
     return {name: drawn() for name, drawn in drawings(document).items()}
 
 
 def written(document: Document, kinds: Sequence[str], columns: int, names: Sequence[str]) -> dict[str, dict[str, bytes]]:
-    """Some pictures of a story, by name and kind: svg, pdf, or csv with the numbers that are drawn. columns: of a journal, 1 or 2."""
+    """Some figures of a story, by name and kind: svg, pdf, or csv with the plotted numbers. columns: of a journal, 1 or 2."""
     found = {}
     for name in names:
         figure = drawings(document)[name]()

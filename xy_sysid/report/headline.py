@@ -1,4 +1,4 @@
-"""One line that says where an axis stands, one sentence below it, and which act is next. Pure; page and report say the same."""
+"""A line that gives the state of an axis, a sentence below it, and the next action. Pure functions, shared by page and report."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ENOUGH = "Nothing is missing"
 
 
 def headline(document: Document | None, doing: str = "") -> str:
-    """Something is missing -> Adding ... -> Explained: 18.7 → 0.33 mm/s. doing: what is being done now, which is said alone."""
+    """Something is missing -> Adding ... -> Explained: 18.7 → 0.33 mm/s. doing: the current activity; if given, the line shows only this."""
     if doing:
         return f"{doing[:1].upper()}{doing[1:]} ..."
     if document is None:
@@ -38,7 +38,7 @@ def headline(document: Document | None, doing: str = "") -> str:
 
 
 def detail(document: Document) -> str:
-    """The sentence below the headline: what is left now, and of what it is made; before an effect is added, what the diagnosis says."""
+    """The sentence below the headline: the residual error and its parts; before an effect is added, the result of the diagnosis."""
     ladder = document["ladder"]
     if not ladder:
         return str(document["sentence"])
@@ -55,7 +55,7 @@ def detail(document: Document) -> str:
 
 
 def next_act(document: Document | None) -> tuple[str, str] | None:
-    """What to do next, and with which effect: diagnose, add, next, keep (the model); None where there is nothing to be done."""
+    """The next action and its effect. Actions: diagnose, add, next, keep (the model); None if there is nothing to do."""
     if document is None or not document["ladder"]:
         return None
     last = document["ladder"][-1]
@@ -70,7 +70,7 @@ def next_act(document: Document | None) -> tuple[str, str] | None:
 
 
 def worst(document: Document, step: int = -1) -> dict[str, Any] | None:
-    """The place where a step's model fails most; None if it fails nowhere."""
+    """The place where a step's model has the largest error; None if it fails nowhere."""
     pictures = document["steps"][step]["pictures"] if document["steps"] else None
     failing = pictures["failing"] if pictures else []
     return max(failing, key=lambda item: float(item["error_over_floor"])) if failing else None
@@ -84,7 +84,7 @@ def _fails(document: Document) -> str:
 
 
 def _fall(document: Document) -> str:
-    """18.7 → 0.33 mm/s."""
+    """Error before and after: 18.7 → 0.33 mm/s."""
     first, last = (_error(document, item) for item in (document["ladder"][0], document["ladder"][-1]))
     before, _, unit = first.partition(" ")
     after, _, same = last.partition(" ")

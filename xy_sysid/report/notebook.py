@@ -1,4 +1,4 @@
-"""A result as a notebook shows it: its line, and the picture that says more, which an exported notebook still shows without a network."""
+"""A result in a notebook: its line and one figure, which an exported notebook also shows offline."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from xy_sysid.report.vector import vectors
 
 
 def html(result: Any, picture: str) -> str | None:
-    """The line and a figure of ``plots``; None if there is nothing to draw.
+    """The line and a figure of ``plots`` as HTML; None if there is nothing to draw.
 
-    A notebook that keeps plotly.js (``plotly.io.renderers``) draws the figure with it. Elsewhere the figure stands in the output itself: as vectors,
+    A notebook that loads plotly.js (``plotly.io.renderers``) draws the figure with it. Otherwise the output itself holds the figure: as vectors,
     or, without Matplotlib, together with plotly.js.
     """
     if picture == "bode" and len(result) == 0:
@@ -28,7 +28,7 @@ def html(result: Any, picture: str) -> str | None:
 
 
 def whole(figure: go.Figure) -> str:
-    """The figure as HTML that needs nothing else."""
+    """The figure as HTML that needs no other file."""
     try:
         svg = vectors(figure, ["svg"])["svg"].decode()
     except MissingExtra:

@@ -1,4 +1,4 @@
-"""The paper of a figure: as wide as one or two columns of a journal, with margins as wide as the words in them need."""
+"""Figure size for print: one or two journal columns wide, with margins as wide as the labels need."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
 MM = 1 / 25.4  # inches
 WIDTHS = {1: 88.0 * MM, 2: 181.0 * MM}  # inches of one and two columns, of IEEE; other journals have 80 to 90 and 170 to 190 mm
-TALL = {1: 0.72, 2: 1.0}  # of the height on a page
-PIXELS = 100.0  # px of the page in an inch of height
-PAD = 0.04  # inches between the outermost words and the edge
-ROUNDS = 2  # of fitting: with the margins the ticks change, and with these the margins
-MOST = 4  # columns of the legend
-TILTED = 30.0  # degrees, of words under an axis that would run into each other
+TALL = {1: 0.72, 2: 1.0}  # fraction of the height on the page
+PIXELS = 100.0  # px on the page per inch of height
+PAD = 0.04  # inches between the outermost labels and the edge
+ROUNDS = 2  # iterations: the margins change the ticks, and the ticks change the margins
+MOST = 4  # maximum columns of the legend
+TILTED = 30.0  # degrees: rotation of labels under an axis that would overlap
 
 
 def sheet(height: float, columns: int) -> Figure:
@@ -44,7 +44,7 @@ def rows(paper: Figure, layout: Any) -> dict[str, Axes]:
 
 
 def legend(paper: Figure, axes: Mapping[str, Axes], shown: bool | None) -> float:
-    """A legend of all names above the axes, in as many columns as fit side by side; its height in inches, 0 without one.
+    """Draw a legend of all names above the axes, in as many columns as fit. Returns its height in inches, 0 without a legend.
 
     shown: as in Plotly; None: if there is more than one name
     """
@@ -67,7 +67,7 @@ def legend(paper: Figure, axes: Mapping[str, Axes], shown: bool | None) -> float
 
 
 def fit(paper: Figure, axes: Mapping[str, Axes], above: float) -> None:
-    """Move and size the axes so that all of their words are on the paper. above: inches at the top that are taken."""
+    """Move and size the axes so that all of their labels are on the paper. above: inches at the top that are already used."""
     wide, high = paper.get_size_inches()
     for turn in range(ROUNDS):
         boxes = [box for ax in axes.values() if (box := ax.get_tightbbox(bbox_extra_artists=ax.texts)) is not None]
@@ -91,7 +91,7 @@ def fit(paper: Figure, axes: Mapping[str, Axes], above: float) -> None:
 
 
 def _tilt(axes: Mapping[str, Axes]) -> bool:
-    """Turn words under an axis that overlap; whether any did."""
+    """Rotate overlapping labels under an axis; returns True if any overlapped."""
     tilted = False
     for ax in axes.values():
         labels = [label for label in ax.get_xticklabels() if label.get_visible() and label.get_text()]

@@ -1,4 +1,4 @@
-"""Parts that figures are made of: rows, log frequency axes, bands, curves with gaps."""
+"""Building blocks of figures: rows, log frequency axes, bands, curves with gaps."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import readable
 
-GAP = 2.5  # times the usual spacing of lines, above which a curve is interrupted
+GAP = 2.5  # a curve is interrupted where the spacing exceeds this multiple of the usual line spacing
 
 
 def plain(text: str) -> str:
-    """Text from a file for a place where Plotly would take HTML for markup."""
+    """Escape text from a file where Plotly would read it as HTML."""
     return escape(text, quote=False)
 
 
 def decibel(response: ComplexArray, output_unit: str) -> FloatArray:
-    """20 log10 of the magnitude in people's unit of the output (mm for m)."""
+    """20 log10 of the magnitude in the display unit of the output (mm for m)."""
     scale, _ = readable(output_unit)
     return np.asarray(20 * np.log10(np.maximum(np.abs(response) * scale, np.finfo(float).tiny)), dtype=np.float64)
 
@@ -38,15 +38,15 @@ def phase_of(response: ComplexArray) -> FloatArray:
 
 
 def rows(number: int, *, shared: bool, gap: float, heights: list[float] | None = None, mode: str = "light") -> go.Figure:
-    """An empty figure of so many rows; shared: one x axis for all; gap: between rows, part of the height; mode: light or dark."""
+    """An empty figure with this number of rows; shared: one x axis for all; gap: between rows, fraction of the height; mode: light or dark."""
     return copy.deepcopy(_empty(number, shared, gap, tuple(heights) if heights is not None else None, mode))
 
 
 @functools.lru_cache(maxsize=64)
 def _empty(number: int, shared: bool, gap: float, heights: tuple[float, ...] | None, mode: str) -> go.Figure:
-    """The same, made once: Plotly takes 50 ms to check a template, and 2 ms to copy what it has checked.
+    """The empty figure, built once and cached: Plotly needs 50 ms to check a template, and 2 ms to copy a checked figure.
 
-    The template is given before the rows are made, as Plotly would else lay it over a template of its own.
+    The template is given before the rows are made. Otherwise Plotly would merge it with its own default template.
     """
     figure = go.Figure(layout={"template": template(mode), "height": ROW * number + 90, "margin": {"l": 10, "r": 12, "t": 36, "b": 10}})
     figure = make_subplots(
@@ -61,7 +61,7 @@ def _empty(number: int, shared: bool, gap: float, heights: tuple[float, ...] | N
 def stretches(
     figure: go.Figure, spans: Sequence[tuple[float, float]], fill: str, *, row: int = 1, line: Mapping[str, Any] | None = None, layer: str = "above"
 ) -> None:
-    """Stretches of x over the whole height of a row, given to the figure together: Plotly takes 20 ms for each that ``add_vrect`` adds."""
+    """Shade spans of x over the full height of a row, all in one call: ``add_vrect`` takes 20 ms for each."""
     number = "" if row == 1 else str(row)
     shape = {
         "type": "rect",
@@ -77,14 +77,14 @@ def stretches(
 
 
 def unbroken(frequency: FloatArray) -> list[slice]:
-    """Stretches of lines between gaps much wider than the usual spacing."""
+    """Slices of consecutive lines between gaps that are much wider than the usual spacing."""
     steps = np.diff(frequency)
     cuts = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else np.array([], dtype=np.int64)
     return [slice(a, b) for a, b in itertools.pairwise([0, *cuts.tolist(), frequency.size])]
 
 
 def broken(pieces: list[slice], values: FloatArray) -> FloatArray:
-    """The values with a NaN between pieces, so that no line is drawn over a gap."""
+    """The values with NaN between pieces, so that no line is drawn across a gap."""
     return np.concatenate([np.append(values[piece], np.nan) for piece in pieces])[:-1]
 
 
@@ -103,7 +103,7 @@ def band(figure: go.Figure, row: int, around: tuple[FloatArray, FloatArray], col
 
 
 def frequency_axis(figure: go.Figure, row: int, frequency: list[FloatArray]) -> None:
-    """A log axis over all the frequencies, Hz, titled at ``row``."""
+    """Log axes over all the frequencies, Hz; the title is at ``row``."""
     low, high = (float(np.log10(limit)) for limit in (min(f[0] for f in frequency), max(f[-1] for f in frequency)))
     room = 0.02 * (high - low)
     figure.update_xaxes(type="log", range=[low - room, high + room], dtick=1, tickformat="~g", minor={"dtick": "D2", "ticklen": 3})
@@ -111,11 +111,11 @@ def frequency_axis(figure: go.Figure, row: int, frequency: list[FloatArray]) -> 
 
 
 def turns(phases: list[FloatArray]) -> float:
-    """Step between ticks of a phase axis: 90 degrees, or more where that would crowd it."""
+    """Tick spacing of a phase axis: 90 degrees, or more where labels would be too dense."""
     span = max(float(np.max(p)) for p in phases) - min(float(np.min(p)) for p in phases)
     return next((step for step in (45.0, 90.0, 180.0, 360.0, 720.0) if span <= 5.5 * step), 3600.0)
 
 
 def positive(values: FloatArray) -> FloatArray:
-    """For a log axis: NaN where not above 0."""
+    """Values for a log axis: NaN where not above 0."""
     return np.where(np.isfinite(values) & (values > 0), values, np.nan)

@@ -1,4 +1,4 @@
-"""Pictures for a notebook, drawn by the report's own functions: each takes results and gives a Plotly figure (``.show()``)."""
+"""Figures for a notebook, drawn by the report's functions: each takes results and returns a Plotly figure (``.show()``)."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ DASHES = ("dash", "solid", "dot", "dashdot", "longdash")
 
 
 def bode(frf: FrequencyResponse, *others: FrequencyResponse | AnyModel) -> go.Figure:
-    """Magnitude and phase of a measured response with its 95 % band, and of models over it (of physical ones the linear part).
+    """Magnitude and phase of a measured response with its 95 % band, and of models (for physical models, the linear part).
 
-    Each model is drawn as a measurement like this one is expected to see it: held, sampled, blurred by the window. Other responses are drawn
-    beside the first, and noise and nonlinear distortion where they are known.
+    Each model is drawn as this measurement would see it: with hold, sampling and the window's smoothing. Other responses are drawn
+    in the same figure. Noise and nonlinear distortion are drawn where they are known.
     """
     measured = {frf.origin.axis or "measured": frf}
     for number, other in enumerate((item for item in others if isinstance(item, FrequencyResponse)), 2):
@@ -61,18 +61,18 @@ def coherence(frf: FrequencyResponse) -> go.Figure:
 
 
 def coupling(found: Coupling) -> go.Figure:
-    """Coupling of two axes in each band, with its 95 % limit, in per cent of the own motion."""
+    """Coupling of two axes in each band, with its 95 % limit, in per cent of the axis's own motion."""
     return coupling_figure(found)
 
 
 def ladder(found: Answer) -> go.Figure:
-    """The errors of all steps as a falling staircase, of ``diagnose`` or ``refine``: training, held-out, and the noise floor."""
+    """Training error, held-out error and noise floor of each step of ``diagnose`` or ``refine``, as a falling staircase."""
     units = {"input": found.units.input, "output": found.units.output, "judged": found.units.judged}
     return story_progress.ladder({"ladder": [rung_document(rung) for rung in found.rungs], "sentence": found.sentence, "units": units})
 
 
 def residual(data: Run | Recording | Comparison, *models: AnyModel) -> go.Figure:
-    """The error over the noise floor by frequency: of one comparison, or of models on a run."""
+    """The error divided by the noise floor, by frequency: of one comparison, or of models on a run."""
     figure = drawing([1.0], 320, "light")
     if isinstance(data, Comparison):
         shown = [("error", data)]

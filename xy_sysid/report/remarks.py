@@ -1,4 +1,4 @@
-"""Sentences that the page must make where they are true."""
+"""Sentences that the report must contain where they are true."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from xy_sysid.report.tables import roots_text
 from xy_sysid.report.words import estimate_text, interval_text, number
 from xy_sysid.response.frf import ComplexArray
 
-MUCH_BETTER = 3.0  # times smaller error at which the delay in the model is called the reason
+MUCH_BETTER = 3.0  # factor between the errors above which the missing delay is named as the reason
 NOT_A_CONFIDENCE = (
     "The “parameter confidence” of the paper is 100 minus the error cost. It is shown for comparison, but it is not a confidence "
     "interval and gives no uncertainty of a parameter. The brackets in the tables are 95 % confidence intervals from the variance "
@@ -68,7 +68,7 @@ def _fit(axis: str, name: str, fit: Fit) -> list[str]:
 
 
 def poles_outside(fit: Fit) -> ComplexArray:
-    """Poles, integrators aside, whose frequency is below the first or above the last line."""
+    """Poles, except integrators, whose frequency is below the first or above the last line."""
     frequency = np.abs(fit.poles) / (2 * np.pi)
     outside = (np.abs(fit.poles) > 0) & ((frequency < fit.frequency[0]) | (frequency > fit.frequency[-1]))
     return np.asarray(fit.poles[outside], dtype=np.complex128)
@@ -103,5 +103,5 @@ def _change(one: AxisStudy) -> list[str]:
 
 
 def _misses(change: BeforeAfter) -> bool:
-    """True if either fit leaves more than noise explains."""
+    """True if the residual error of either fit is above the noise."""
     return any(pair is not None and pair.fit.consistent is False for pair in (change.before, change.after))

@@ -1,4 +1,4 @@
-"""The report: one page with a summary, and all evidence behind it."""
+"""The report: one page with a summary, followed by all evidence."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MARKS = {"explained": "good", "partly explained": "fair", "not explained": "bad"
 
 
 class _Page:
-    """Sections in their order, and the drawings in them."""
+    """Sections in order, and the drawings in them."""
 
     def __init__(self) -> None:
         self.parts: list[str] = []
@@ -52,11 +52,11 @@ class _Page:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """What is told of the recording itself.
+    """Information about the recording itself.
 
     cover: title, machine, author, date; units: of input and output; facts: (what, value) of the experiment
     origins: label -> provenance; notes: what was odd while reading
-    coupling: what two axes that were driven at once do to each other, None of one axis or where the notes say why not
+    coupling: how two axes that were driven at the same time affect each other; None for one axis, or if the notes give a reason
     """
 
     cover: Cover
@@ -116,7 +116,7 @@ def _summary(page: _Page, axes: Mapping[str, AxisReport], library: Library) -> N
 
 
 def _stands(one: AxisReport, library: Library) -> str:
-    """Where an axis stands, and with which effects."""
+    """State of an axis, and the effects in its model."""
     if one.story is None:
         return one.problem
     effects = one.story["ladder"][-1]["effects"] if one.story["ladder"] else []
@@ -124,7 +124,7 @@ def _stands(one: AxisReport, library: Library) -> str:
 
 
 def _told(one: AxisReport, library: Library) -> tuple[str, ...]:
-    """The paragraphs of one axis."""
+    """The paragraphs about one axis."""
     made = []
     story = one.story
     if story is None:
@@ -209,7 +209,7 @@ def _verdicts(axis: str, one: AxisReport) -> Table:
 
 
 def _axis(page: _Page, place: int, one: AxisReport, story: Mapping[str, Any], library: Library) -> None:
-    """Where the rigid model fails, what was missing, and what is left."""
+    """Add where the rigid model fails, the missing effect, and the residual error."""
     axis, last = one.axis, len(story["steps"]) - 1
 
     def draw(name: str, made: Any, alt: str, title: str = "") -> Drawing:

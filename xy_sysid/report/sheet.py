@@ -1,6 +1,6 @@
-"""One HTML page that opens offline: headings, figures with words, tables, and where it all comes from.
+"""One HTML page that opens offline: headings, figures with captions, tables, and provenance.
 
-What goes on it is the business of ``study_page`` (the paper's study) and ``report_page`` (everything).
+``study_page`` (the paper's study) and ``report_page`` (the full report) choose its content.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from xy_sysid.report.cover import Cover, css_string
 from xy_sysid.report.tables import Table
 from xy_sysid.report.theme import template
 
-KEPT = ("svg", "png", "csv")  # what a figure can be kept as; PDF by printing, or ``xy-sysid figures``
-SENTENCE = 42  # letters from which a cell is a sentence
+KEPT = ("svg", "png", "csv")  # file types for saving a figure; PDF by printing, or ``xy-sysid figures``
+SENTENCE = 42  # characters; a longer cell is treated as a sentence
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """One Plotly figure of the page: its element's id, the figure, what it shows in words, and its title."""
+    """One Plotly figure of the page: its element's id, the figure, its description in words, and its title."""
 
     name: str
     figure: go.Figure
@@ -34,7 +34,7 @@ class Drawing:
 
 
 def whole(cover: Cover, head: str, parts: Iterable[str], drawings: Iterable[Drawing]) -> str:
-    """The page. cover: title of the window, and the words at the foot of each printed page; head: above all sections, HTML; parts: the sections."""
+    """The page. cover: window title and page footer; head: HTML above all sections; parts: the sections."""
     plots = {drawing.name: json.loads(drawing.figure.to_json()) for drawing in drawings}
     for plot in plots.values():
         plot["layout"].pop("template", None)
@@ -86,7 +86,7 @@ def pictures(drawings: Sequence[Drawing], caption: str, labelled_by: str = "") -
 
 
 def block(name: str, title: str, words: str, content: str) -> str:
-    """Words and HTML under a heading."""
+    """Text and HTML under a heading."""
     return f'<section id="{name}"><h2>{escape(title)}</h2><p>{escape(words)}</p>{content}</section>'
 
 
@@ -109,7 +109,7 @@ def table_html(table: Table) -> str:
 
 
 def provenance_html(origins: Mapping[str, Mapping[str, Any]]) -> str:
-    """The last section: what every number was made from, and by what."""
+    """The last section: the source data and software version behind the numbers."""
     made = []
     for label, origin in origins.items():
         rows = "".join(f"<dt>{escape(str(key))}</dt><dd>{escape(_flat(value))}</dd>" for key, value in origin.items() if value not in ([], (), ""))
@@ -118,12 +118,12 @@ def provenance_html(origins: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _long(sentences: bool) -> str:
-    """Sentences are broken into lines, numbers are not."""
+    """CSS for long cells: sentences wrap, numbers do not."""
     return ' class="long"' if sentences else ""
 
 
 def _safe(document: object) -> str:
-    """JSON that cannot end the script element it stands in."""
+    """JSON that cannot close the script element around it."""
     return json.dumps(document, separators=(",", ":")).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 

@@ -1,4 +1,4 @@
-"""What a figure of a long signal needs: few points that hide nothing, a distribution, a spectrum, a drift."""
+"""Data of a figure for a long signal: few points that keep all extremes, a distribution, a spectrum, a drift."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from xy_sysid.samples.recording import Recording
 POINTS = 1500  # bins of an envelope: about one per pixel of a wide screen
 SPECTRUM_POINTS = 400
 LONGEST_SEGMENT = 2**16  # samples of a segment for the power spectral density
-EDGE = 0.1  # the band ends where the density falls below this part (-10 dB) of its level
+EDGE = 0.1  # the band ends where the density falls below this fraction (-10 dB) of its level
 EXCERPT = 500  # samples
 
 
@@ -32,7 +32,7 @@ class Density:
 class Excitation:
     """The input of one axis as figure 2 shows it.
 
-    time, value: (k,) s and unit, an excerpt; rms, peak: of the whole, mean removed from the rms
+    time, value: (k,) s and unit, an excerpt; rms, peak: of the full signal; the mean is removed from the rms
     centre, share: (bins,) unit and 1/unit, the distribution; density: its power spectral density
     """
 
@@ -64,7 +64,7 @@ class Motion:
 def envelope(time: FloatArray, value: FloatArray, bins: int = POINTS) -> tuple[FloatArray, FloatArray]:
     """(time, value) of the smallest and the largest sample of each of ``bins`` equal parts, in their order.
 
-    At most 2 ``bins`` points; a signal that is not longer than that comes back as it is.
+    At most 2 ``bins`` points; a shorter signal is returned unchanged.
     """
     size = value.shape[0]
     if size <= 2 * bins:

@@ -1,4 +1,4 @@
-"""Pictures of a story over frequency: Bode, coherence; and the poles and zeros of its linear part."""
+"""Story figures over frequency: Bode, coherence; and the poles and zeros of the linear part."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LEAST = 0.3  # coherence of a trusted line
 
 
 def bode(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Magnitude and phase over log frequency: measured with its 95 % band, the model over it, lines not trusted in grey."""
+    """Magnitude and phase over log frequency: the measurement with its 95 % band, and the model; untrusted lines in grey."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
@@ -58,7 +58,7 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
 
 
 def coherence(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Coherence of every line: 1 where the input explains all of the output; lines that are not trusted in grey."""
+    """Coherence of every line: 1 where the input explains all of the output; untrusted lines in grey."""
     if document["measured"] is None:
         return nothing(document["sentence"], mode)
     measured = document["measured"]["frequency_response"]
@@ -85,7 +85,7 @@ def coherence(document: Document, step: int | None = None, mode: str = "light") 
 
 
 def poles_zeros(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Poles (crosses) and zeros (circles) of the model's linear part; the unstable half is shaded when a root lies in it."""
+    """Poles (crosses) and zeros (circles) of the model's linear part; the unstable half-plane is shaded if it contains a root."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
@@ -114,18 +114,18 @@ def poles_zeros(document: Document, step: int | None = None, mode: str = "light"
 
 
 def _signs(root: dict[str, float]) -> tuple[int, ...]:
-    """A pair is written once."""
+    """Signs of the imaginary part to draw: both for a pair, which is stored once."""
     return (1, -1) if abs(root["imag"]) > 0 else (1,)
 
 
 def stretches(trusted: np.ndarray) -> list[slice]:
-    """Runs of neighbouring trusted lines."""
+    """Slices of consecutive trusted lines."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], trusted.astype(np.int8), [0]))))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _between(trusted: np.ndarray) -> slice:
-    """From the first to the last trusted line: beyond them nothing is excited and a simulated response means nothing."""
+    """The slice from the first to the last trusted line. Outside it the input has no power and a simulated response means nothing."""
     found = np.flatnonzero(trusted)
     return slice(int(found[0]), int(found[-1]) + 1) if found.size else slice(None)
 

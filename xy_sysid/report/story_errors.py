@@ -1,4 +1,4 @@
-"""Pictures of where a model fails: its error over the noise floor by frequency, speed, position and time."""
+"""Story figures of where a model fails: its error divided by the noise floor, by frequency, speed, position and time."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from xy_sysid.report.story_parts import Document, drawing, floor_line, legend_na
 from xy_sysid.report.theme import FAILS, MODEL, UNTRUSTED, fade
 from xy_sysid.units import motion
 
-LEAST = 0.25  # of the noise floor: a mean error below it is shown as the trifle that it is
+LEAST = 0.25  # of the noise floor: the axis shows at least this range, so that a small mean error looks small
 
 
 def residual(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Error over the noise floor by frequency, on data that no fit saw; failing bands shaded and named."""
+    """Error divided by the noise floor, by frequency, on held-out data; failing bands are shaded and labelled."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
@@ -49,22 +49,22 @@ def residual(document: Document, step: int | None = None, mode: str = "light") -
 
 
 def residual_speed(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Error against velocity: its size over the noise floor, and its mean; friction jumps at zero, saturation bends the ends."""
+    """Error against velocity: rms divided by the noise floor, and mean. Friction shows at zero, saturation at the ends."""
     return _against(document, "speed", step, mode)
 
 
 def residual_position(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Error against position: its size over the noise floor, and its mean; cogging, lead errors and springs show here."""
+    """Error against position: rms divided by the noise floor, and mean. Cogging, lead errors and springs show here."""
     return _against(document, "position", step, mode)
 
 
 def residual_time(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Error against time: its size over the noise floor, and its mean; what drifts shows here. Grey stretches are data that no fit saw."""
+    """Error against time: rms divided by the noise floor, and mean. Drift shows here. Held-out data are grey."""
     return _against(document, "time", step, mode)
 
 
 def residual_correlation(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Does the error go with itself, and with past inputs? Grey is what unrelated signals show; stems beyond it are a model's fault."""
+    """Correlation of the error with itself and with past inputs. Grey: range for unrelated signals; stems outside it indicate a model fault."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
@@ -109,7 +109,7 @@ def _against(document: Document, kind: str, step: int | None, mode: str) -> go.F
     ratio_axis(figure, [ratio])
     floor_line(figure)
     places = [item for item in shown["pictures"]["failing"] if item["kind"] == kind and item["to"] > item["from"]]
-    if kind == "speed":  # a place is a range of its size; the picture has its sign
+    if kind == "speed":  # a place is a range of |speed|; the figure has signed velocity
         places += [{**item, "from": -item["to"], "to": -item["from"]} for item in places]
     if by.size > 1:
         shade(figure, places, (float(by[0]), float(by[-1])), log=False, scale=scale)

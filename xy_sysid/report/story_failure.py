@@ -1,4 +1,4 @@
-"""The first picture: error over the noise floor by one thing each, small enough to stand four abreast, and on one scale."""
+"""Error divided by the noise floor by one variable, as small figures: four fit side by side on one scale."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from xy_sysid.units import motion
 
 By = Literal["frequency", "speed", "position", "time"]
 HEIGHT = 190  # px
-SHADED = 3  # places of a kind
+SHADED = 3  # maximum shaded places of a kind
 
 
 def failure(document: Document, by: By, step: int | None = None, mode: str = "light") -> go.Figure:
-    """Error over the noise floor by frequency, speed, position or time: the step's model, and the rigid one in grey behind it.
+    """Error divided by the noise floor, by frequency, speed, position or time: the step's model, and the rigid model in grey.
 
-    All four share one scale, that of the rigid model's largest error, so that it is seen where and how far the error falls.
+    All four share one scale, set by the rigid model's largest error, so that the reader sees where and how far the error falls.
     """
     shown, base = pictured(document, step), pictured(document, 0)
     if shown is None or base is None:
@@ -67,7 +67,7 @@ def _people(document: Document, by: By) -> tuple[float, str]:
 
 
 def _ends(document: Document) -> tuple[float, float]:
-    """log10 of the common scale."""
+    """log10 of the ends of the common scale."""
     base = pictured(document, 0)
     assert base is not None
     highest = max(float(np.nanmax(_curve(base, by)[1], initial=2.0)) for by in ("frequency", "speed", "position", "time"))
@@ -75,9 +75,9 @@ def _ends(document: Document) -> tuple[float, float]:
 
 
 def _places(figure: go.Figure, step: Document, by: By, ends: tuple[float, float], scale: float) -> None:
-    """Shaded where it fails; the worst is named."""
+    """Shade the places where the model fails; label the worst."""
     places: list[Any] = [item for item in step["pictures"]["failing"] if item["kind"] == by and item["to"] > item["from"]][:SHADED]
-    if by == "speed":  # a place is a range of its size; the picture has its sign
+    if by == "speed":  # a place is a range of |speed|; the figure has signed velocity
         mirrored = [{**item, "from": -item["to"], "to": -item["from"]} for item in places]
         places = [{**a, "from": b["from"]} if a["from"] <= 0 else a for a, b in zip(places, mirrored, strict=True)] + [
             b for a, b in zip(places, mirrored, strict=True) if a["from"] > 0
@@ -88,7 +88,7 @@ def _places(figure: go.Figure, step: Document, by: By, ends: tuple[float, float]
 
 
 def failure_words(document: Document, by: By, step: int | None = None) -> str:
-    """The same for who cannot see it."""
+    """The figure in words, for screen readers."""
     shown = pictured(document, step)
     if shown is None:
         return str(document["sentence"])

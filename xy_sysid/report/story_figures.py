@@ -1,14 +1,14 @@
-"""Every picture of a story: a story's JSON document in, a Plotly figure out. The page and the report draw these and no others.
+"""Every figure of a story: a story's JSON document in, a Plotly figure out. The page and the report draw only these.
 
     bode coherence poles_zeros                                        over frequency, and the linear part
-    residual residual_speed residual_position residual_time           where the model fails, over the noise floor
-    residual_correlation                                              whether what is left goes with itself and with the input
+    residual residual_speed residual_position residual_time           where the model fails, divided by the noise floor
+    residual_correlation                                              correlation of the residual error with itself and the input
     zoom velocity position                                            measured and simulated, in time
     ladder before_after candidates                                    progress
 
-All take ``(document, step=None, mode="light")``: step is a place in ``document["steps"]`` (None: the newest), mode light or dark;
-``ladder`` and ``candidates`` are of the whole story, and ``before_after(document, first=0, last=None)`` is of two steps. A story without
-steps gives a figure with its sentence. Colours read on both papers, so a page may swap the template alone (``theme.template``).
+All take ``(document, step=None, mode="light")``: step is an index into ``document["steps"]`` (None: the newest), mode is light or dark.
+``ladder`` and ``candidates`` show the full story; ``before_after(document, first=0, last=None)`` shows two steps. A story without
+steps gives a figure with a sentence. Colours are readable on both backgrounds, so a page may swap only the template (``theme.template``).
 """
 
 from __future__ import annotations

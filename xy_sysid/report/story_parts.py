@@ -1,4 +1,4 @@
-"""What the figures of a story share: the document's rows as arrays, people's units, floor lines, shaded places."""
+"""Shared parts of a story's figures: the document's rows as arrays, display units, floor lines, shaded places."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from xy_sysid.units import motion
 
 Document = Mapping[str, Any]
 
-AHEAD = "one sample ahead"  # in the label of a step whose error is not that of a free simulation
-WIDE = 44  # letters of a line of a legend
-NAMED, LINE = 3, 14  # places of a picture that are named, and px of a line of small words
+AHEAD = "one sample ahead"  # in the label of a step whose error is a one-step prediction error, not one of a free simulation
+WIDE = 44  # maximum letters in a line of a legend
+NAMED, LINE = 3, 14  # labelled places per figure, and px per line of small text
 MARGIN = {"l": 8, "r": 10, "t": 30, "b": 8}
 SMALL = 220  # px, height of a figure of one row
 
 
 def row(values: Sequence[float | None] | None) -> FloatArray:
-    """A row of the document; null is NaN, a missing row is empty."""
+    """A row of the document as an array (k,); null becomes NaN, a missing row is empty."""
     return np.array([np.nan if value is None else value for value in values or ()], dtype=np.float64)
 
 
 def pictured(document: Document, step: int | None = None) -> Mapping[str, Any] | None:
-    """The step asked for (the newest if None), or the newest before it that has pictures; None if there is none."""
+    """The requested step (None: the newest), or the newest earlier step that has figure data; None if there is none."""
     steps = list(document["steps"])
     if not steps:
         return None
@@ -40,12 +40,12 @@ def pictured(document: Document, step: int | None = None) -> Mapping[str, Any] |
 
 
 def speed_unit(document: Document) -> tuple[float, str]:
-    """Factor and name of people's unit of errors: 1000 and mm/s for m."""
+    """Factor and name of the display unit of errors: 1000 and mm/s for m."""
     return motion(document["units"].get("judged", f"{document['units']['output']}/s"))
 
 
 def drawing(heights: list[float], height: int, mode: str, gap: float = 0.07, shared: bool = True) -> go.Figure:
-    """An empty figure with narrow margins; heights: of its rows, parts of the whole."""
+    """An empty figure with narrow margins; heights: of its rows, fractions of the total."""
     figure = rows(len(heights), shared=shared, gap=gap, heights=heights, mode=mode)
     figure.update_layout(height=height, margin=MARGIN)
     figure.update_xaxes(zeroline=False)
@@ -53,7 +53,7 @@ def drawing(heights: list[float], height: int, mode: str, gap: float = 0.07, sha
 
 
 def nothing(sentence: str, mode: str) -> go.Figure:
-    """A figure that says why there is none."""
+    """An empty figure with a sentence that gives the reason."""
     figure = drawing([1.0], SMALL, mode)
     figure.update_xaxes(visible=False)
     figure.update_yaxes(visible=False)
@@ -62,7 +62,7 @@ def nothing(sentence: str, mode: str) -> go.Figure:
 
 
 def floor_line(figure: go.Figure, at: int = 1, level: float = 1.0, label: str = "noise floor") -> None:
-    """A horizontal line at the floor of a log axis, named once at its left."""
+    """A horizontal line at the noise floor of a log axis, labelled once at its left."""
     figure.add_hline(y=level, line={"color": FLOOR, "width": 1.5, "dash": "dot"}, row=at, col=1)
     figure.add_annotation(
         text=label, x=0, y=np.log10(level), xref="x domain", yref=_axis("y", at), xanchor="left", yanchor="bottom", showarrow=False,
@@ -71,7 +71,7 @@ def floor_line(figure: go.Figure, at: int = 1, level: float = 1.0, label: str = 
 
 
 def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0, at: int = 1) -> None:
-    """Failing places as shaded stretches, the first NAMED by their size, each in a line of its own; ends: of the axis in the document's unit."""
+    """Shade failing places and label the first NAMED with their size, each on its own line; ends: of the axis, in the document's unit."""
     low, high = ends
     for level, item in enumerate(places):
         first, last = max(float(item["from"]), low), min(float(item["to"]), high)
@@ -93,7 +93,7 @@ def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float,
 
 
 def ratio_axis(figure: go.Figure, values: Sequence[FloatArray], title: str = "error / floor", at: int = 1) -> None:
-    """A log axis for errors over the floor that always shows the floor and, above it, room for words."""
+    """A log axis for errors divided by the noise floor. It always includes the floor and leaves room for labels above it."""
     known = np.concatenate([item[np.isfinite(item) & (item > 0)] for item in values]) if values else np.ones(1)
     low, high = (float(np.min(known)), float(np.max(known))) if known.size else (1.0, 1.0)
     bottom, top = np.log10(min(max(low, 0.03), 0.6)), np.log10(max(high, 3.0))
@@ -109,13 +109,13 @@ def words(name: str) -> str:
 
 
 def legend_name(start: str, shown: Document) -> str:
-    """The name of a model's curve with all effects of the model, in lines that a legend has room for."""
+    """The legend name of a model's curve: all effects of the model, wrapped to the width of a legend."""
     effects = ", ".join([words(str(name)) for name in shown["effects"]] + [AHEAD] * (AHEAD in str(shown["label"])))
     return "<br>".join(textwrap.wrap(f"{start} with {effects}", WIDE)) if effects else start
 
 
 def shade_held_out(figure: go.Figure, document: Document, shown: Document, at: tuple[int, ...] = (1,)) -> None:
-    """Grey where no fit has seen the data. The first stretch is named, at the foot of the first row."""
+    """Shade held-out data in grey. The first span is labelled at the bottom of the first row."""
     time = document["measured"]["time"]
     ahead = AHEAD in str(shown["label"])
     spans = [(float(time["held_out_from"]), float(document["seconds"]))] if ahead else [(float(a), float(b)) for a, b in time["held_out"]]
@@ -128,7 +128,7 @@ def shade_held_out(figure: go.Figure, document: Document, shown: Document, at: t
 
 
 def grey(size: int = 4) -> dict[str, Any]:
-    """Markers of what is not trusted."""
+    """Marker style of untrusted values."""
     return {"color": fade(UNTRUSTED, 0.75), "size": size, "symbol": "x-thin", "line": {"width": 1, "color": fade(UNTRUSTED, 0.75)}}
 
 

@@ -1,4 +1,4 @@
-"""Pictures of progress: the ladder of errors, two steps overlaid, and the candidates with their errors."""
+"""Story figures of progress: errors of all steps, two steps overlaid, and the candidates with their errors."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from xy_sysid.report.story_parts import LINE, Document, drawing, floor_line, leg
 from xy_sysid.report.theme import AFTER, BEFORE, FLOOR, MODEL, UNTRUSTED, fade
 from xy_sysid.report.words import number, quantity
 
-LOWEST = 170  # px of the candidates: in less, the title of the axis has no room
-LEAST = 0.35  # of a decade to each side, so that a scale has two figures at least
-WIDE = 14  # letters of a line below a step of the ladder; one that runs over the edge is not drawn at all
+LOWEST = 170  # px, least height of the candidates figure: a lower one has no room for the axis title
+LEAST = 0.35  # decades on each side, so that a scale has at least two labelled ticks
+WIDE = 14  # letters of a label below a step; Plotly does not draw a label that crosses the edge
 
 
 def ladder(document: Document, mode: str = "light") -> go.Figure:
-    """The errors of all steps as a falling staircase: training, held-out, and the noise floor."""
+    """Training error, held-out error and noise floor of all steps, as a falling staircase."""
     rungs = list(document["ladder"])
     if not rungs:
         return nothing(document["sentence"], mode)
@@ -71,7 +71,7 @@ def ladder(document: Document, mode: str = "light") -> go.Figure:
 
 
 def before_after(document: Document, first: int = 0, last: int | None = None, mode: str = "light") -> go.Figure:
-    """Two steps over each other: error over the floor by frequency, and the error in time around the base's largest."""
+    """Two steps overlaid: error divided by the noise floor by frequency, and the error in time around the rigid model's largest error."""
     before, after = pictured(document, first), pictured(document, last)
     if before is None or after is None:
         return nothing(document["sentence"], mode)
@@ -109,7 +109,7 @@ def before_after(document: Document, first: int = 0, last: int | None = None, mo
 
 
 def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Figure:
-    """What each candidate leaves of the held-out error, least first, with its evidence on hover; dotted: the floor, dashed: without any."""
+    """The held-out error with each candidate, smallest first, with its evidence on hover; dotted: noise floor, dashed: without a candidate."""
     named = list(document["effects"])
     tried = sorted(document["candidates"], key=lambda item: (float(f"{item['held_out_error']:.2g}"), item["effect"] not in named))[:most]
     if not tried:
@@ -158,7 +158,7 @@ def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Fig
 
 
 def _of_step(name: str, shown: Mapping[str, Any]) -> str:
-    """before: rigid, with delay; after: with all effects that the model then has."""
+    """Label of a step. before: rigid, with delay; after: all effects of that model."""
     return legend_name(f"{name}:", shown) if shown["effects"] else f"{name}: {words(str(shown['label']))}"
 
 

@@ -12,7 +12,7 @@ from xy_sysid.units import readable
 
 
 def zoom(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """The moment around the base's largest error: velocity measured and simulated, and below their difference."""
+    """Measured and simulated velocity around the rigid model's largest error, and below their difference."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
@@ -35,7 +35,7 @@ def zoom(document: Document, step: int | None = None, mode: str = "light") -> go
 
 
 def velocity(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """The whole record: least and most of each bucket of velocity, measured and simulated; zoomable."""
+    """The full record: minimum and maximum velocity in each bin, measured and simulated; zoomable."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)
@@ -58,7 +58,7 @@ def velocity(document: Document, step: int | None = None, mode: str = "light") -
 
 
 def position(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
-    """The whole record: position measured, and simulated from the input alone."""
+    """The full record: measured position, and position simulated from the input alone."""
     shown = pictured(document, step)
     if shown is None:
         return nothing(document["sentence"], mode)

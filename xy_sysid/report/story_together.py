@@ -1,4 +1,4 @@
-"""Several recordings, axes and models in one picture: responses over each other, and the error of each model below."""
+"""Several recordings, axes and models in one figure: overlaid responses, and the error of each model below."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DASHES = ("dash", "dot", "dashdot", "longdash")
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One axis of one recording: what it is called, its story, and the steps of it whose models are drawn."""
+    """One axis of one recording: its label, its story, and the steps whose models are drawn."""
 
     name: str
     document: Document
@@ -29,9 +29,9 @@ class Entry:
 
 
 def together(entries: Sequence[Entry], mode: str = "light") -> go.Figure:
-    """Measured responses with 95 % bands, a colour each, the models chosen in the same colour, and their error over the floor.
+    """Measured responses with 95 % bands, one colour each; the chosen models in the same colour, and their error divided by the noise floor.
 
-    Entries whose units differ stand on one scale of dB all the same; the axis then names both.
+    Entries with different units share one dB scale; the axis title then names both units.
     """
     shown = [entry for entry in entries if entry.document["measured"] is not None]
     if not shown:
@@ -57,7 +57,7 @@ def together(entries: Sequence[Entry], mode: str = "light") -> go.Figure:
 
 
 def _measured(figure: go.Figure, entry: Entry, colour: str, turn: float) -> FloatArray:
-    """Draw what is measured, its phase turned by so much; the phase where it is trusted, degrees."""
+    """Draw the measured response, with its phase shifted by ``turn`` degrees; returns the phase of trusted lines, degrees."""
     measured = entry.document["measured"]["frequency_response"]
     lift = _lift(entry)
     frequency, trusted = row(measured["frequency"]), np.array(measured["trusted"], dtype=bool)
@@ -75,19 +75,19 @@ def _measured(figure: go.Figure, entry: Entry, colour: str, turn: float) -> Floa
 
 
 def _phase(entry: Entry) -> FloatArray:
-    """Degrees, where it is trusted."""
+    """Phase of trusted lines, degrees."""
     measured = entry.document["measured"]["frequency_response"]
     phase, trusted = row(measured["phase_deg"]), np.array(measured["trusted"], dtype=bool)
     return phase[trusted] if bool(trusted.any()) else phase
 
 
 def _turn(entry: Entry, first: Entry) -> float:
-    """Whole turns, degrees, that bring a phase beside that of the first entry."""
+    """Multiple of 360 degrees that brings the phase close to that of the first entry."""
     return 360.0 * round(float(np.median(_phase(first)) - np.median(_phase(entry))) / 360.0)
 
 
 def _model(figure: go.Figure, entry: Entry, step: int, turn: float, line: dict[str, object]) -> list[FloatArray]:
-    """Draw one model over what is measured, and its error; the error, if there is one."""
+    """Draw one model over the measurement, and its error; returns the error, if there is one."""
     picture = pictured(entry.document, step)
     if picture is None:
         return []
@@ -110,5 +110,5 @@ def _model(figure: go.Figure, entry: Entry, step: int, turn: float, line: dict[s
 
 
 def _lift(entry: Entry) -> float:
-    """dB from SI to people's unit of the output."""
+    """dB from SI to the display unit of the output."""
     return float(20 * np.log10(readable(entry.document["units"]["output"])[0]))

@@ -1,4 +1,4 @@
-"""A story in words: verdict, captions of its pictures, and tables."""
+"""A story in words: verdict, figure captions, and tables."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ ROOTS = "Poles and zeros of the linear part, without the nonlinear effects."
 
 
 def status(story: Document | None) -> str:
-    """explained, partly explained, not explained, or nothing can be said."""
+    """explained, partly explained, not explained, or no statement possible."""
     if story is None or not story["ladder"]:
         return "nothing can be said"
     first, last = story["ladder"][0], story["ladder"][-1]
@@ -54,13 +54,13 @@ def status(story: Document | None) -> str:
 
 
 def named(name: str, library: Library) -> str:
-    """An effect with what it is on a machine."""
+    """The name of an effect together with its meaning on a machine."""
     known = library.effects.get(name)
     return f"{words(name)} ({known.meaning})" if known is not None else words(name)
 
 
 def spoken(text: str, library: Library) -> str:
-    """A sentence with the names of effects as words."""
+    """A sentence in which names of effects are replaced by words."""
     for name in sorted(library.effects, key=len, reverse=True):
         text = text.replace(name, words(name))
     return text
@@ -85,7 +85,7 @@ def verdict(story: Document, library: Library) -> str:
 
 
 def size(story: Document, speed: float) -> str:
-    """How large the error is, against the motion, against the rigid model and against noise."""
+    """The size of the error, relative to the motion, the rigid model and the noise."""
     unit = story["error"]["unit"]
     first, last = story["ladder"][0], story["ladder"][-1]
     how = "Predicted one sample ahead (contact allows no free simulation)" if AHEAD in last["label"] else "Simulated from the input alone"
@@ -102,7 +102,7 @@ def size(story: Document, speed: float) -> str:
 
 
 def confidence(story: Document) -> str:
-    """How sure the name is; empty where there is none."""
+    """The confidence in the named effect; empty without one."""
     if story["verdict"] != "missing_effect":
         return ""
     sure = 100 * float(story["confidence"])
@@ -110,7 +110,7 @@ def confidence(story: Document) -> str:
 
 
 def runner_up(story: Document) -> str:
-    """Why the next best lost; empty where there is none."""
+    """Why the second-best candidate was rejected; empty without one."""
     return f"Runner-up: {story['runner_up']['sentence']}" if story["verdict"] == "missing_effect" and story["runner_up"] else ""
 
 
@@ -125,7 +125,7 @@ def places_table(story: Document, axis: str) -> Table | None:
 
 
 def ladder_table(story: Document, axis: str) -> Table:
-    """The ladder in figures."""
+    """The errors of all steps as a table."""
     unit = story["error"]["unit"]
     rows = tuple(
         (

@@ -26,7 +26,7 @@ NEAR = 2.0  # an antiresonance belongs to a resonance when their frequencies dif
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Resonance, and the antiresonance that belongs to it where there is one, with intervals; in the fit named."""
+    """A resonance and its antiresonance (None without one), with intervals, in the fit that is named."""
 
     resonance: Interval
     antiresonance: Interval | None
@@ -44,13 +44,13 @@ class Shift:
 
     @property
     def certain(self) -> bool:
-        """True if the interval leaves out 0."""
+        """True if the interval excludes 0."""
         return self.low > 0.0 or self.high < 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class BeforeAfter:
-    """The pair in two stretches of data; None where no lightly damped resonance was found, ``problem`` says why."""
+    """The pair in two parts of the data; None if no lightly damped resonance was found; ``problem`` gives the reason."""
 
     before_name: str
     after_name: str
@@ -60,7 +60,7 @@ class BeforeAfter:
 
     @property
     def shifts(self) -> tuple[Shift, ...]:
-        """Of the antiresonance (if both have one) and of the resonance; empty if one stretch has no pair."""
+        """Shift of the antiresonance (if both parts have one) and of the resonance; empty if one part has no pair."""
         if self.before is None or self.after is None:
             return ()
         made = []
@@ -75,7 +75,7 @@ class BeforeAfter:
 
 @dataclass(frozen=True, slots=True)
 class AxisStudy:
-    """Everything about one axis; ``fits`` holds LLS, NLLS (the paper's path) and ML, empty if ``problem`` says why not; choice: of orders."""
+    """Everything about one axis; ``fits`` holds LLS, NLLS (the paper's method) and ML, empty if ``problem`` gives a reason; choice: of orders."""
 
     axis: str
     excitation: Excitation
@@ -89,17 +89,17 @@ class AxisStudy:
 
     @property
     def frf(self) -> FrequencyResponse | None:
-        """The measured response, None if there is none."""
+        """The measured response, None without one."""
         return self.estimate.frf if self.estimate else None
 
 
 def study_axis(
     recording: Recording, axis: str, settings: IdentifierSettings, period: int | None = 0, loose: Recording | None = None, refit: bool = True
 ) -> AxisStudy:
-    """The study of one axis; what cannot be done is said in ``problem``.
+    """The study of one axis; ``problem`` says which part was not possible.
 
-    period: as in ``offline.estimate``; loose: a second recording of the same machine, to be compared with the first;
-    without one the two halves of the first are compared (``refit`` False leaves that out).
+    period: as in ``offline.estimate``; loose: a second recording of the same machine, which is compared with the first.
+    Without it, the two halves of the first are compared (not if ``refit`` is False).
     """
     drive, moved = excitation(recording, axis), motion(recording, axis)
     try:
@@ -126,7 +126,7 @@ def three_fits(frf: FrequencyResponse, structure: Structure) -> dict[str, Fit]:
 def before_after(
     recording: Recording, axis: str, settings: IdentifierSettings, period: int | None, loose: Recording | None, whole: Fit
 ) -> BeforeAfter:
-    """The pair before and after, each fitted from the model of the whole."""
+    """The pair before and after; each fit starts from the model of the full data."""
     if loose is None:
         names = ("first half", "second half")
         first, second = split(recording, 0.5)
@@ -151,7 +151,7 @@ def before_after(
 
 
 def pair_of(fit: Fit, near: float | None = None) -> Pair | None:
-    """The watched resonance of a fit (the one nearest to ``near`` Hz if given) with its antiresonance; None without one."""
+    """The watched resonance of a fit (the one nearest to ``near`` Hz if given) and its antiresonance; None without one."""
     resonance = watched(fit, near) if fit.converged else None
     if resonance is None:
         return None

@@ -1,4 +1,4 @@
-"""The study as one HTML page that opens offline: figures, tables, remarks, and where it all comes from."""
+"""The study as one HTML page that opens offline: figures, tables, remarks, and provenance."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def study_page(
     origins: Mapping[str, Mapping[str, Any]],
     notes: tuple[str, ...] = (),
 ) -> str:
-    """The whole page.
+    """The HTML page.
 
     title: name of the recording; studies: by axis; units: of input and output; least_coherence: limit of a trusted line
-    origins: label -> provenance of each recording; notes: what was odd while reading
+    origins: label -> provenance of each recording; notes: anomalies found while reading
     """
     input_unit, output_unit = units
     responses = {axis: one.frf for axis, one in studies.items() if one.frf is not None}

@@ -1,4 +1,4 @@
-"""Tables 1 and 2 of the paper's study as rows of text: what goes into HTML, and nothing about HTML."""
+"""Tables 1 and 2 of the paper's study as rows of text, without HTML."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Table:
 
 
 def coefficient_table(axis: str, fits: Mapping[str, Fit]) -> Table:
-    """Table 1, of one axis: coefficients of falling powers of s with the denominator's first one 1."""
+    """Table 1, for one axis: coefficients of falling powers of s, scaled so that the denominator's first one is 1."""
     ml = fits["ML"]
     scale, shown = readable(ml.tf.output_unit)
     rows: list[tuple[str, ...]] = []
@@ -49,7 +49,7 @@ def coefficient_table(axis: str, fits: Mapping[str, Fit]) -> Table:
 
 
 def result_table(one: AxisStudy) -> Table:
-    """Table 2, of one axis: errors, what the paper calls confidence, and the physical numbers with their intervals."""
+    """Table 2, for one axis: errors, the paper's confidence measure, and the physical parameters with their intervals."""
     fits = one.fits
     ml = fits["ML"]
     same = [fits[name] for name in METHODS]
@@ -71,7 +71,7 @@ def result_table(one: AxisStudy) -> Table:
 
 
 def order_table(axis: str, tried: Sequence[OrderTrial], fit: Fit) -> Table | None:
-    """The orders that were tried, the shortest description first; None if there was only one."""
+    """The tested orders, shortest description length first; None if there was only one."""
     if len(tried) < 2:
         return None
     at = fit.structure.numerator_order, fit.structure.denominator_order
@@ -88,7 +88,7 @@ def order_table(axis: str, tried: Sequence[OrderTrial], fit: Fit) -> Table | Non
 
 
 def change_table(studies: Mapping[str, AxisStudy]) -> Table | None:
-    """The pair before and after, of every axis that has it; None if no axis has."""
+    """The pair before and after, for every axis that has it; None if no axis has it."""
     rows: list[tuple[str, ...]] = []
     heads = ("", "before", "after", "shift")
     for axis, one in studies.items():
@@ -104,7 +104,7 @@ def change_table(studies: Mapping[str, AxisStudy]) -> Table | None:
 
 
 def roots_text(roots: FloatArray | object) -> str:
-    """Roots, conjugates once."""
+    """Roots as text; a conjugate pair is written once."""
     values = np.asarray(roots, dtype=np.complex128)
     return "; ".join(_together(root(complex(value))) for value in values if value.imag >= 0) or "none"
 
@@ -120,7 +120,7 @@ def _named(fit: Fit, name: str) -> Interval | None:
 
 
 def _slowest(fit: Fit) -> Interval | None:
-    """The real pole nearest to zero that is no integrator."""
+    """The slowest real pole, except integrators."""
     real = [item for item in fit.intervals_with_misfit if item.name.startswith("pole_") and "." not in item.name]
     return min(real, key=lambda item: abs(item.value)) if real else None
 
@@ -130,7 +130,7 @@ def _interval(item: Interval | None, without: str = "none found") -> str:
 
 
 def _together(text: str) -> str:
-    """A text that is not broken into lines."""
+    """The text with non-breaking spaces."""
     return text.replace(" ", "\u00a0")
 
 

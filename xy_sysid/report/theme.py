@@ -1,4 +1,4 @@
-"""Colours and templates of the figures: lines that read on white and on near-black, ink that follows the page."""
+"""Colours and templates of the figures: lines readable on white and near-black, text colour from the page."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ AXES = ("#1e8fe4", "#e85a0d", "#257250", "#8a36ec", "#c9478a", "#8a8420")
 METHODS = {"measured": "#7f8993", "LLS": "#e85a0d", "NLLS": "#8a36ec", "ML": "#1e8fe4"}
 DRIFT = "#8a36ec"
 BEFORE, AFTER = "#1e8fe4", "#e85a0d"
-MEASURED, MODEL, FLOOR, FAILS, UNTRUSTED = "#1e8fe4", "#e85a0d", "#257250", "#ba189d", "#87959f"  # of a story, each with a dash or marker too
+MEASURED, MODEL, FLOOR, FAILS, UNTRUSTED = "#1e8fe4", "#e85a0d", "#257250", "#ba189d", "#87959f"  # of a story; each also has its own dash or marker
 FONT = "system-ui, -apple-system, 'Segoe UI', 'Liberation Sans', Arial, sans-serif"
 ROW = 230  # height of a row of a figure, px
 INK = {"light": ("#24292f", "#dfe3e8", "#aab2bb", "#ffffff"), "dark": ("#d7dce1", "#30363d", "#59636e", "#22272e")}

@@ -1,4 +1,4 @@
-"""The trend of a fleet as one page that opens offline: what changed, and every parameter of every axis over time."""
+"""The trend of a fleet as one page that opens offline: the changes, and every parameter of every axis over time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from xy_sysid.report.tables import Table
 from xy_sysid.report.theme import AFTER, BEFORE, METHODS, axis_colour, fade
 from xy_sysid.units import Units, readable
 
-MOST = 4  # parameters of an event that are drawn, the most certain first
+MOST = 4  # parameters drawn per event, the most certain first
 ABOUT = (
     "Each point is the parameter of one recording. Its interval (95 %) holds the recording's own error and the spread between recordings of an "
     "axis that does not change, which is learned from all axes of the table. The vertical line is the first recording after a change, the "
@@ -62,7 +62,7 @@ def _drawn(found: Trends, event: Event) -> list[Trend]:
 
 
 def axis_figure(trends: Sequence[Trend], axis: Axis) -> go.Figure:
-    """Parameters of an axis over time, one above the other, with their intervals and the dates of their changes."""
+    """Parameters of an axis over time, stacked, with their intervals and the dates of their changes."""
     figure = rows(max(len(trends), 1), shared=True, gap=0.06)
     for row, one in enumerate(trends, 1):
         history = one.history
@@ -87,7 +87,7 @@ def axis_figure(trends: Sequence[Trend], axis: Axis) -> go.Figure:
 
 
 def overview_figure(trends: Sequence[Trend], column: str = "") -> go.Figure:
-    """One parameter of all axes, in per cent of its median before any change. column: its name, for the figure's axis."""
+    """One parameter of all axes, in per cent of its median before any change. column: its name, for the axis title."""
     figure = rows(1, shared=False, gap=0.1)
     coloured = 0
     for one in sorted(trends, key=lambda item: bool(item.moved)):

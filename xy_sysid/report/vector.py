@@ -1,6 +1,6 @@
-"""A figure as vectors, SVG or PDF, without a browser: what Plotly would draw, drawn by Matplotlib.
+"""A figure as vectors, SVG or PDF, without a browser: Matplotlib draws a Plotly figure.
 
-It knows what the figures of this package are made of: lines, markers, areas and bars in rows; logarithmic axes; shapes and words.
+Supports the elements of this package's figures: lines, markers, areas and bars in rows; logarithmic axes; shapes and text.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ SYMBOLS = {"x-thin": "x", "circle-open": "o", "circle": "o", "diamond": "D"}
 RGBA = re.compile(r"rgba?\(([^)]*)\)")
 INK = "#24292f"
 SANS = "xy_sysid Sans"
-FAMILY = (1, 3, 4, 16)  # name records of a font that say its family
-LETTERS = (  # ranges of Unicode, the last not included; what is not among them comes from DejaVu Sans itself
+FAMILY = (1, 3, 4, 16)  # name records of a font that contain its family
+LETTERS = (  # Unicode ranges, end excluded; other characters come from DejaVu Sans itself
     (0x20, 0x180), (0x391, 0x3CA), (0x2010, 0x2040), (0x2070, 0x20A0), (0x2190, 0x2194), (0x2212, 0x2213), (0x221A, 0x221B), (0x2248, 0x2249),
     (0x2264, 0x2266),
 )  # fmt: skip
-BAR = 0.85  # of the room for a bar
-DECADES = 1.6  # of a logarithmic axis below which 2 and 5 are named, too
+BAR = 0.85  # bar width as a fraction of the spacing
+DECADES = 1.6  # a logarithmic axis with fewer decades also has labels at 2 and 5
 
 
 def vectors(figure: go.Figure, kinds: Sequence[str], columns: int = 2) -> dict[str, bytes]:
-    """The figure as svg, pdf or both, by kind: drawn once, written in each. Raises MissingExtra without Matplotlib.
+    """The figure as svg, pdf or both, by kind; it is drawn once. Raises MissingExtra without Matplotlib.
 
-    columns: of a journal, 1 or 2, whose width it has; words have the same size in both
+    columns: of a journal, 1 or 2; sets the width; text has the same size in both
     """
     mpl = installed()
     look: Any = {
@@ -70,9 +70,9 @@ def installed() -> ModuleType:
 
 @functools.cache
 def _font() -> tuple[str, tempfile.TemporaryDirectory[str]]:
-    """The family of a font that has only LETTERS of DejaVu Sans, and the folder that must stay while it is used.
+    """The family of a font with only LETTERS of DejaVu Sans, and a folder that must exist while the font is used.
 
-    A PDF holds the letters it needs: to find them among all of DejaVu Sans takes longer than to draw the figure.
+    A PDF embeds the letters that it uses. Finding them in the full DejaVu Sans takes longer than drawing the figure.
     """
     from fontTools import subset
     from matplotlib.font_manager import findfont, fontManager
@@ -98,7 +98,7 @@ def _written(paper: Figure, kind: str) -> bytes:
 
 
 def drawn(figure: go.Figure, columns: int) -> Figure:
-    """The figure on a sheet of its width."""
+    """The figure on a sheet of the journal's width."""
     layout = figure.layout
     paper = sheet(float(layout.height or 400), columns)
     axes = rows(paper, layout)
@@ -155,7 +155,7 @@ def _area(ax: Axes, trace: Any, curve: tuple[FloatArray, FloatArray], before: tu
 
 
 def _bars(ax: Axes, trace: Any, together: Sequence[Any]) -> None:
-    """Bars from the left with their names, or from below. together: all that stand on these axes, as wide as the closest two allow."""
+    """Draw horizontal bars with their names, or vertical bars. together: all bars on these axes; the two closest set the width."""
     colours = [_colour(each) for each in trace.marker.color] if isinstance(trace.marker.color, (list, tuple)) else _colour(trace.marker.color)
     label = _words(trace.name) if trace.showlegend is not False and trace.name else "_nolegend_"
     if trace.orientation != "h":
@@ -243,7 +243,7 @@ def _numbers(values: Any) -> FloatArray:
 
 
 def _colour(text: Any) -> Any:
-    """As Matplotlib takes it."""
+    """A colour in Matplotlib's notation."""
     found = RGBA.fullmatch(str(text)) if text is not None else None
     if found is None:
         return str(text) if text else INK
@@ -252,5 +252,5 @@ def _colour(text: Any) -> Any:
 
 
 def _words(text: Any) -> str:
-    """Without markup, lines as lines."""
+    """The text without markup; <br> becomes a new line."""
     return unescape(re.sub(r"<[^>]*>", "", re.sub(r"<br\s*/?>", "\n", str(text or ""))))

@@ -1,4 +1,4 @@
-"""Numbers as people read them: mm, ms, Hz, a true minus sign, an interval."""
+"""Numbers for readers: mm, ms, Hz, a true minus sign, an interval."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LARGE, TINY = 1e6, 1e-4  # numbers are written with a power of ten from LARGE on
 
 
 def number(value: float, digits: int = 4) -> str:
-    """Significant digits, with a true minus; a dash if not finite."""
+    """The number with this many significant digits and a true minus; a dash if not finite."""
     if not math.isfinite(value):
         return "–"
     text = f"{value:.{digits}g}"
@@ -31,19 +31,19 @@ def _superscript(value: int) -> str:
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:
-    """A number with the unit that people use for it."""
+    """A number in its display unit."""
     scale, shown = readable(unit)
     return f"{number(value * scale, digits)} {shown}".rstrip()
 
 
 def moved(value: float, unit: str, digits: int = 4) -> str:
-    """A motion or its speed, as a number with the unit that people use for it."""
+    """A motion or speed in its display unit."""
     scale, shown = motion(unit)
     return f"{number(value * scale, digits)} {shown}"
 
 
 def possible(name: str, figures: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Value and both ends of an interval, without what cannot be: a delay, a friction or a gap below zero.
+    """Value and both ends of an interval, clipped to possible values: a delay, friction or gap is never below zero.
 
     name: of the parameter, as in ``gain`` or ``effect.parameter``
     """
@@ -57,7 +57,7 @@ def _not_negative(name: str) -> bool:
     effect, _, own = name.partition(".")
     if not own:
         return effect == "delay"
-    from xy_sysid.axis.model import STANDARD  # a second: who only draws does without
+    from xy_sysid.axis.model import STANDARD  # takes a second to import; callers that only draw do not need it
 
     known = STANDARD.effects.get(effect)
     return known is not None and any(item.name == own and item.low >= 0.0 for item in known.parameters)
@@ -76,7 +76,7 @@ def interval_parts(value: float, low: float, high: float) -> tuple[str, str, str
 
 
 def interval_text(value: float, low: float, high: float, unit: str, name: str = "") -> str:
-    """value [low, high] unit, in people's units; name: of the parameter, whose impossible values are left out."""
+    """value [low, high] unit, in display units; name: of the parameter, whose impossible values are clipped."""
     scale, shown = readable(unit)
     value, low, high = possible(name, (value, low, high))
     middle, first, last, power = interval_parts(value * scale, low * scale, high * scale)

@@ -1,4 +1,4 @@
-"""The report as a page: what ``xy-sysid report`` and a notebook share."""
+"""The report as a page, for ``xy-sysid report`` and for notebooks."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from xy_sysid.settings import IdentifierSettings
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A finished report. page: HTML; axes: what it says, by axis; cover: its head; origin: where the numbers come from.
+    """A finished report. page: HTML; axes: the report of each axis; cover: its head; origin: provenance of the numbers.
 
-    coupling: what the first two axes do to each other, or None
+    coupling: how the first two axes affect each other, or None
     """
 
     page: str
@@ -38,9 +38,9 @@ class Written:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A report that is asked for.
+    """A requested report.
 
-    paths: of the recording; axes: to report on; cover: what was said; command: how it was asked for; begin: see ``axis_reports``
+    paths: of the recording; axes: to report on; cover: given entries; command: the command line; begin: see ``axis_reports``
     """
 
     paths: tuple[Path, ...]
@@ -53,7 +53,7 @@ class Asked:
 
 
 def written_report(recording: Recording, asked: Asked) -> Written:
-    """The whole page. Raises BadInput for a date that is none, before any work is done."""
+    """The report. Raises BadInput for an invalid date, before any computation."""
     cover = cover_of(recording, asked.cover, asked.paths, datetime.now(UTC).astimezone().date())
     made = axis_reports(recording, asked.axes, asked.wanted, asked.tell, asked.begin)
     source = ", ".join(str(path) for path in asked.paths) or recording.source
@@ -85,9 +85,9 @@ def write_report(
     """Write the report of a recording as one HTML page that opens offline and prints with page numbers.
 
     title, machine, author: words for its head; the machine is by default the one that the recording names in its meta data
-    recorded: the day, as 2026-03-03 or 2026-03-03T14:30:00; by default what the recording's clock or the name of its file tells
+    recorded: the date, as 2026-03-03 or 2026-03-03T14:30:00; by default from the recording's clock or its file name
     budget: processor time for the diagnosis of each axis, s; force: replace the file
-    Raises BadInput if the file is there and not ``force``, and for a date that is none.
+    Raises BadInput if the file exists and ``force`` is False, and for an invalid date.
     """
     path = Path(path)
     free("file", path, force, "say force=True")
@@ -99,7 +99,7 @@ def write_report(
 
 
 def coupled(recording: Recording, names: tuple[str, ...], settings: IdentifierSettings) -> tuple[Coupling | None, tuple[str, ...]]:
-    """What the first two of the axes do to each other, and notes; without an answer a note says why."""
+    """How the first two axes affect each other, and notes; if the coupling is None, a note gives the reason."""
     if len(names) < 2:
         return None, ()
     try:
@@ -109,7 +109,7 @@ def coupled(recording: Recording, names: tuple[str, ...], settings: IdentifierSe
 
 
 def facts(recording: Recording, names: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """What was recorded: (what, value)."""
+    """Facts of the recording: (label, value)."""
     runs = recording.runs()
     longest = recording.run(names[0]).seconds if names and len(recording) else 0.0
     rate = float(recording.sampling_rate)

@@ -1,4 +1,4 @@
-"""Sum, product, inverse and closed loop of responses, with their uncertainty (to first order; the errors of two measurements are independent).
+"""Sum, product, inverse and closed loop of responses, with uncertainty (first order; errors of two measurements are taken to be independent).
 
 The second operand may be another response, anything with ``response(frequency)`` and units (a transfer function), or a number. Two
 measured responses are interpolated to the lines of the first, within their common band.
@@ -18,7 +18,7 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Operand:
-    """Values (m,) of the second operand at the first one's lines, their sigma, whether they are trusted, and units; empty units fit any."""
+    """Values (m,) of the second operand at the first one's lines, their sigma, trusted lines, and units; empty units match any."""
 
     values: ComplexArray
     sigma: FloatArray
@@ -28,7 +28,7 @@ class Operand:
 
 
 def added(one: FrequencyResponse, other: Any, sign: float = 1.0) -> FrequencyResponse:
-    """one + sign other, of the same units."""
+    """one + sign other; both must have the same units."""
     one, second = _together(one, other)
     if second.output_unit and (second.input_unit, second.output_unit) != (one.input_unit, one.output_unit):
         raise _apart("sum", one, second)
@@ -46,7 +46,7 @@ def multiplied(one: FrequencyResponse, other: Any) -> FrequencyResponse:
 
 
 def inverted(one: FrequencyResponse) -> FrequencyResponse:
-    """Input over output."""
+    """The inverse response: input over output."""
     with np.errstate(divide="ignore", invalid="ignore"):
         response, sigma = 1.0 / one.response, one.sigma / np.abs(one.response) ** 2
     made = _made(one, response, sigma, np.isfinite(response))
@@ -54,7 +54,7 @@ def inverted(one: FrequencyResponse) -> FrequencyResponse:
 
 
 def closed(plant: FrequencyResponse, controller: Any) -> FrequencyResponse:
-    """The loop from reference to output, P C / (1 + P C), of a plant and its controller, from the plant's output to its input."""
+    """The closed loop from reference to output, P C / (1 + P C); the controller goes from the plant's output to its input."""
     plant, second = _together(plant, controller)
     if second.output_unit and (second.output_unit, second.input_unit) != (plant.input_unit, plant.output_unit):
         raise _apart("loop", plant, second)
@@ -94,7 +94,7 @@ def _together(one: FrequencyResponse, other: Any) -> tuple[FrequencyResponse, Op
 
 
 def _made(one: FrequencyResponse, response: ComplexArray, sigma: FloatArray, trusted: Any) -> FrequencyResponse:
-    """Without the smoothing kernel, which belongs to the first operand alone."""
+    """The result as a response, without the smoothing kernel, which is valid for the first operand only."""
     return replace(
         one,
         response=np.asarray(response, dtype=np.complex128),

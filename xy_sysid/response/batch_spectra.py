@@ -1,4 +1,4 @@
-"""Spectra of a whole recording at once: the same sums as window by window, in the time of the FFTs they need.
+"""Spectra of a full recording at once: the same sums as window by window, at the cost of the FFTs alone.
 
 One complex transform serves both signals, u + j y: the spectrum of a real signal is even, that of j times one is odd
 (Press et al., Numerical Recipes, 3rd ed., sec. 12.3.1).
@@ -16,14 +16,14 @@ from xy_sysid.response.spectra import Spectra, mean
 from xy_sysid.response.windows import LINES_APART, WindowShape, error_correlation
 from xy_sysid.samples.block import FloatArray
 
-CHUNK = 4  # windows transformed together: their samples and spectra stay in the processor's cache
+CHUNK = 4  # windows transformed together: their samples and spectra fit in the processor's cache
 
 
 @compiled
 def _join(u: FloatArray, y: FloatArray, first: int, hop: int, taper: FloatArray, out: ComplexArray) -> float:
-    """Windows of both signals without their means, tapered, as one complex signal u + j scale y; the scale.
+    """Write windows of both signals, mean removed and tapered, as one complex signal u + j scale y into ``out``; returns the scale.
 
-    The scale gives both the same size, so that the rounding of one does not show in the other.
+    The scale gives both signals the same size, so that rounding errors of one do not affect the other.
     """
     length, scale = taper.shape[0], 1.0
     for i in range(out.shape[0]):
@@ -39,7 +39,7 @@ def _join(u: FloatArray, y: FloatArray, first: int, hop: int, taper: FloatArray,
 
 @compiled
 def _accumulate(z: ComplexArray, scale: float, gxx: FloatArray, gyy: FloatArray, real: FloatArray, imag: FloatArray) -> None:
-    """Take the transforms of both signals out of their common one: X = even part of Z, j scale Y = odd part; add their products."""
+    """Separate the transforms of both signals from the joint one: X = even part of Z, j scale Y = odd part; add their products to the sums."""
     half = 0.5 / scale
     for i in range(z.shape[0]):
         up, down = z[i], z[i, ::-1]
@@ -58,7 +58,7 @@ def _accumulate(z: ComplexArray, scale: float, gxx: FloatArray, gyy: FloatArray,
 
 
 def batch_spectra(runs: list[tuple[int, FloatArray, FloatArray]], shape: WindowShape, differenced: bool) -> Spectra:
-    """Spectra of one axis over gap-free runs.
+    """Spectra of one axis, summed over gap-free runs.
 
     runs: (counter of the first sample, input (n,), output (n,)) each; windows start on multiples of the hop, as online.
     Raises BadInput if no run holds a window.

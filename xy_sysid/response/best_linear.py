@@ -1,9 +1,9 @@
 """Best linear approximation from several realisations of a periodic input, with separate noise and nonlinear distortion.
 
-Within a realisation only noise differs from period to period. From one realisation (other random phases) to the next, what friction and other
-nonlinear laws add differs as well: it looks like noise, and does not average out over periods. So the scatter over periods tells the noise,
-the scatter over realisations tells both. (Pintelon & Schoukens, System Identification, 2nd ed., sec. 4.3.1, the robust method; Schoukens, Vaes &
-Pintelon, IEEE Control Syst. Mag. 36 (2016), 38-69)
+Within a realisation only noise differs from period to period. From one realisation (other random phases) to the next, the distortion by friction
+and other laws differs too: it looks like noise, but averaging over periods does not reduce it. So the scatter over periods gives the noise,
+and the scatter over realisations gives noise plus distortion. (Pintelon & Schoukens, System Identification, 2nd ed., sec. 4.3.1, the robust method;
+Schoukens, Vaes & Pintelon, IEEE Control Syst. Mag. 36 (2016), 38-69)
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.response.h1 import divisor
 from xy_sysid.samples.block import FloatArray
 
-DRIVEN = 1e-3  # of the strongest line's power: less is not excited
+DRIVEN = 1e-3  # of the strongest line's power; a weaker line is not excited
 FEWEST = 2  # realisations, and periods of each
 
 Realisation = tuple[FloatArray, FloatArray]
@@ -25,9 +25,9 @@ Realisation = tuple[FloatArray, FloatArray]
 
 
 def best_linear(frf: FrequencyResponse, realisations: Sequence[Realisation]) -> FrequencyResponse:
-    """The response with its scatter from realisations and periods; as it is where there are too few of either.
+    """The response with its scatter over realisations and periods; unchanged if there are too few of either.
 
-    frf: of the same windows, one period each. ``sigma`` becomes the larger of what noise and what both together explain; ``noise`` and
+    frf: of the same windows, one period each. ``sigma`` becomes the larger of the values from noise and from noise plus distortion; ``noise`` and
     ``distortion`` are the standard deviations of one realisation's response.
     """
     used = [(u, y) for u, y in realisations if u.shape[0] >= FEWEST]
@@ -59,7 +59,7 @@ def best_linear(frf: FrequencyResponse, realisations: Sequence[Realisation]) -> 
 
 
 def _noise(spectra: ComplexArray) -> FloatArray:
-    """(lines,) variance of one realisation's response by its periods; spectra: (2, periods, lines) of input and output."""
+    """(lines,) variance of one realisation's response from its scatter over periods; spectra: (2, periods, lines) of input and output."""
     u, y = spectra
     left = y - u * (y.mean(axis=0) / u.mean(axis=0))
     power = np.sum(np.abs(left - left.mean(axis=0)) ** 2, axis=0) / (u.shape[0] - 1)

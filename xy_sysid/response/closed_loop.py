@@ -1,16 +1,16 @@
-"""Response of a machine whose controller stays in charge: the joint input-output method, with the reference as instrument.
+"""Response of a machine in closed loop: the joint input-output method, with the reference as instrument.
 
-Feedback carries the output's noise into the input, so output over input (H1) lies between the machine and minus the inverse
-controller. What the reference does to either is free of that noise:
+Feedback carries the output's noise into the input. Therefore output over input (H1) lies between the machine and minus the inverse
+controller. The parts of both signals that are correlated with the reference are free of that noise:
 
     G = Syr / Sur,   sigma^2 = See / (|Sur|^2 / Srr) / (averages - 1)
 
-where e = y - G u is what reference and machine do not explain: See = Cyy - 2 Re(G* Cyu) + |G|^2 Cuu, with C the spectra of y and u
-less what goes along with the reference. (Pintelon & Schoukens, System Identification, 2nd ed., sec. 2.7 and 9.18; Ljung, System
+where e = y - G u is the part that reference and machine do not explain: See = Cyy - 2 Re(G* Cyu) + |G|^2 Cuu. C are the spectra of y and u
+without the part that is correlated with the reference. (Pintelon & Schoukens, System Identification, 2nd ed., sec. 2.7 and 9.18; Ljung, System
 Identification, 2nd ed., sec. 13.5; Söderström & Stoica, Instrumental variable methods, 1983)
 
-A window blurs Syr and Sur, and not the machine itself, so no blur is told with the response: where either turns sharply within a
-few lines, let the reference repeat itself (a multisine), which leaks and blurs nothing.
+A window smooths Syr and Sur, not the machine's response itself, so the response has no smoothing kernel. If either varies strongly within a
+few lines, use a periodic reference (a multisine), which has no leakage and no smoothing.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from xy_sysid.response.spectra import RunningSpectra, Spectra, State, Transforme
 from xy_sysid.response.windows import Window, WindowShape
 from xy_sysid.samples.block import FloatArray
 
-SURE = 0.2  # relative error of reference -> input up to which a quotient by it has the spread that is told, and no bias to speak of
-DRIVEN = 1e-6  # of the strongest line's power: what a reference that repeats itself leaves between its lines is less
+SURE = 0.2  # relative error of reference -> input up to which the quotient has the stated scatter and negligible bias
+DRIVEN = 1e-6  # of the strongest line's power; between its lines a periodic reference has less
 LINES = 2 * NOISE_SMOOTHING + 1
 
 
 @dataclass(frozen=True, slots=True)
 class LoopSpectra:
-    """Spectra of the three pairs of signals over the same windows: output and input by the reference, output by the input."""
+    """Spectra of three pairs of signals over the same windows: reference and output, reference and input, input and output."""
 
     output: Spectra
     input: Spectra
@@ -41,8 +41,8 @@ class LoopSpectra:
 
 
 def loop_spectra(runs: list[tuple[int, FloatArray, FloatArray, FloatArray]], shape: WindowShape, differenced: bool) -> LoopSpectra:
-    """Of whole runs: (counter of the first sample, reference (n,), input (n,), output (n,)) each; see ``batch_spectra``."""
-    cut = slice(None, -1) if differenced else slice(None)  # of the input, so that all pairs have the same windows
+    """Spectra of full runs: (counter of the first sample, reference (n,), input (n,), output (n,)) each; see ``batch_spectra``."""
+    cut = slice(None, -1) if differenced else slice(None)  # shorten the input, so that all pairs have the same windows
     return LoopSpectra(
         output=batch_spectra([(seq, r, y) for seq, r, _, y in runs], shape, differenced),
         input=batch_spectra([(seq, r[cut], u[cut]) for seq, r, u, _ in runs], shape, False),
@@ -67,7 +67,7 @@ class LoopTransformer:
         self._lines = Transformer(shape, differenced).lines
 
     def __call__(self, window: Window) -> list[LoopWindow]:
-        """One for each axis of the window."""
+        """One LoopWindow for each axis of the window."""
         output = np.diff(window.position, axis=0) if self._differenced else window.position
         signals = zip(*(self._lines(values) for values in (window.reference, window.voltage, output)), strict=True)
         return [LoopWindow(of_pair(window.index, r, y), of_pair(window.index, r, u), of_pair(window.index, u, y)) for r, u, y in signals]
@@ -81,7 +81,7 @@ class RunningLoop:
         self._output, self._input, self._between = (RunningSpectra(shape, forget, sliding) for _ in range(3))
 
     def update(self, window: LoopWindow) -> None:
-        """Take one more window."""
+        """Add one window."""
         self._output.update(window.output)
         self._input.update(window.input)
         self._between.update(window.between)
@@ -91,11 +91,11 @@ class RunningLoop:
         return LoopSpectra(output=self._output.get(), input=self._input.get(), between=self._between.get())
 
     def state(self) -> State:
-        """Everything needed to go on later, as arrays."""
+        """The state as arrays, to continue later."""
         return {f"{name}/{key}": value for name, one in self._parts() for key, value in one.state().items()}
 
     def restore(self, state: State) -> None:
-        """Go on from a state of the same shape."""
+        """Continue from a state of the same shape."""
         for name, one in self._parts():
             one.restore({key.removeprefix(f"{name}/"): value for key, value in state.items() if key.startswith(f"{name}/")})
 
@@ -104,9 +104,9 @@ class RunningLoop:
 
 
 def joint_input_output(spectra: LoopSpectra, shape: WindowShape, sampling_rate: float, options: H1Options) -> FrequencyResponse:
-    """The machine's response; coherence is the smaller one of reference with output and with input.
+    """The machine's response; coherence is the smaller of reference with output and reference with input.
 
-    options: units are those of input and output. A line is trusted where both are, and the input follows the reference surely.
+    options: units are those of input and output. A line is trusted if both coherences suffice and reference -> input is accurate.
     """
     options = replace(options, repeated=0.0)
     output = frequency_response(spectra.output, shape, sampling_rate, options)
@@ -132,14 +132,14 @@ def joint_input_output(spectra: LoopSpectra, shape: WindowShape, sampling_rate: 
 
 
 def _reached(spectra: LoopSpectra) -> FloatArray:
-    """(lines,) power of the input that goes along with the reference, |Sur|^2 / Srr, by the gain of the lines around each."""
+    """(lines,) power of the input that is correlated with the reference, |Sur|^2 / Srr, with the gain averaged over the lines around each."""
     power = np.maximum(spectra.input.gxx, np.finfo(float).tiny)
     gain = smoothed(np.abs(spectra.input.gyx) ** 2 / power, LINES) / np.maximum(smoothed(power, LINES), np.finfo(float).tiny)
     return np.asarray(gain * power)
 
 
 def _unexplained(spectra: LoopSpectra) -> FloatArray:
-    """(lines,) power of e = y - G u that does not go along with the reference, as the mean of the driven lines around each."""
+    """(lines,) power of e = y - G u that is not correlated with the reference, averaged over the driven lines around each."""
     power = np.maximum(spectra.output.gxx, np.finfo(float).tiny)
     to_output, to_input = spectra.output.gyx, spectra.input.gyx
     driven = power > DRIVEN * float(np.max(power))

@@ -1,7 +1,7 @@
-"""Two axes at once: the 2 x 2 response, its uncertainty, and whether two single-axis models suffice.
+"""Two axes at the same time: the 2 x 2 response, its uncertainty, and whether two single-axis models suffice.
 
-G = Syu Suu^-1 of two inputs that are not one and the same (two independent noises, orthogonal multisines); the covariance of what the inputs do
-not explain gives sigma of each of the four. (Bendat & Piersol, Random Data, 4th ed., sec. 7.4; Pintelon & Schoukens, System Identification,
+G = Syu Suu^-1 for two different inputs (two independent noises, orthogonal multisines). The covariance of the output that the inputs do
+not explain gives sigma of each of the four entries. (Bendat & Piersol, Random Data, 4th ed., sec. 7.4; Pintelon & Schoukens, System Identification,
 2nd ed., sec. 2.7)
 """
 
@@ -19,24 +19,24 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, as_sensed
 from xy_sysid.tables import Table
 
-SUFFICES = 0.01  # of the own motion: less is below what models of machines reach
-BANDS = 24  # over which coupling is averaged
-ALIKE = 0.95  # coherence of the two inputs from which they cannot be distinguished
-FEWEST = 4.0  # independent windows
-LONGER = 4  # windows of coupling over those of one axis: bands average lines here, and the response of the own axis leaks less into them
+SUFFICES = 0.01  # of the axis's own motion; models of machines are not more accurate than this
+BANDS = 24  # number of bands for averaging the coupling
+ALIKE = 0.95  # coherence of the two inputs from which their effects cannot be separated
+FEWEST = 4.0  # minimum number of independent windows
+LONGER = 4  # window length relative to that of one axis: bands average lines here, and leakage of the axis's own response is smaller
 COMBINED = {
     "corexy": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
     "gantry": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
-}  # (inputs, outputs) -> of the mean and of the difference: x and y of a CoreXY's two motors, travel and yaw of a gantry's two sides
+}  # (inputs, outputs) -> mean and difference: x and y of a CoreXY's two motors, travel and yaw of a gantry's two sides
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Coupling:
-    """What two axes do to each other.
+    """How two axes affect each other.
 
-    axes: their names; response: (lines, 2, 2) complex, output i over input j; sigma: (lines, 2, 2); frequency: (lines,) Hz, those used
-    windows, seconds: that were averaged; needed: s of such a recording with which the largest 95 % limit would come down to SUFFICES
-    band_edges: (bands + 1,) Hz; coupling, at_most: (bands,) |G_ij| / sqrt(|G_ii G_jj|), rms in the band, the larger way: what is sure, and 95 % limit
+    axes: their names; response: (lines, 2, 2) complex, output i over input j; sigma: (lines, 2, 2); frequency: (lines,) Hz, of the used lines
+    windows, seconds: averaged data; needed: s of such a recording after which the largest 95 % limit would fall to SUFFICES
+    band_edges: (bands + 1,) Hz; coupling, at_most: (bands,) |G_ij| / sqrt(|G_ii G_jj|), rms in the band, larger direction: certain part, 95 % limit
     """
 
     axes: tuple[str, str]
@@ -52,22 +52,22 @@ class Coupling:
 
     @property
     def largest(self) -> float:
-        """Of the 95 % limits over all bands."""
+        """The largest 95 % limit over all bands."""
         return float(np.max(self.at_most))
 
     @property
     def suffice(self) -> bool:
-        """Two single-axis models suffice."""
+        """True if two single-axis models suffice."""
         return self.largest < SUFFICES
 
     @property
     def coupled(self) -> bool:
-        """They do not, for sure."""
+        """True if they certainly do not suffice."""
         return bool(np.any(self.coupling > SUFFICES))
 
     @property
     def table(self) -> Table:
-        """Coupling by band: what is sure, and the 95 % limit, parts of the own motion."""
+        """Coupling by band: certain part and 95 % limit, fractions of the axis's own motion."""
         rows = zip(self.band_edges[:-1].tolist(), self.band_edges[1:].tolist(), self.coupling.tolist(), self.at_most.tolist(), strict=True)
         return Table(("from (Hz)", "to (Hz)", "at least (1)", "at most (1)"), tuple(rows))
 
@@ -106,7 +106,7 @@ class Coupling:
 
 @dataclass(frozen=True, slots=True)
 class CrossSpectra:
-    """Sums over windows of U U*, Y U*, Y Y*, each (lines, 2, 2), and how many independent windows they are worth."""
+    """Sums over windows of U U*, Y U*, Y Y*, each (lines, 2, 2), and the equivalent number of independent windows."""
 
     inputs: ComplexArray
     between: ComplexArray
@@ -116,7 +116,7 @@ class CrossSpectra:
 
 
 class RunningCrossSpectra:
-    """``update`` with windows of both axes, ``get`` the sums."""
+    """``update`` adds windows of both axes, ``get`` returns the sums."""
 
     def __init__(self, shape: WindowShape) -> None:
         """shape: of the windows."""
@@ -126,7 +126,7 @@ class RunningCrossSpectra:
         self._shared = 1.0 + 2.0 * float(np.sum(error_correlation(shape)[1:, 0]))
 
     def update(self, inputs: FloatArray, outputs: FloatArray) -> None:
-        """One more window: (length, 2) of inputs and of outputs, positions differenced."""
+        """Add one window: (length, 2) of inputs and of outputs, positions differenced."""
         one, other = (np.fft.rfft((signal - signal.mean(axis=0)) * self._taper, axis=0) for signal in (inputs, outputs))
         for total, first, second in zip(self._sums, (one, other, other), (one, one, other), strict=True):
             total += first[:, :, None] * second[:, None, :].conj()
@@ -139,9 +139,9 @@ class RunningCrossSpectra:
 
 
 def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float], combine: str = "") -> Coupling:
-    """Of the first two axes of a recording. combine: corexy or gantry, of a machine whose two drives move both.
+    """Coupling of the first two axes of a recording. combine: corexy or gantry, for a machine in which both drives move both axes.
 
-    Raises BadInput for a recording without two axes, too short a one, or two inputs that are alike.
+    Raises BadInput for a recording with fewer than two axes, one that is too short, or two inputs that are too similar.
     """
     if len(recording.axes) < 2:
         raise BadInput("axes of the recording", ", ".join(recording.axes), "two", "Record both axes at once, each with a signal of its own.")
@@ -157,7 +157,7 @@ def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float]
 def coupling_of(
     spectra: CrossSpectra, shape: WindowShape, rate: float, band: tuple[float, float], axes: tuple[str, str], differenced: bool
 ) -> Coupling:
-    """Of sums over windows; rate: Hz; differenced: whether the outputs are differences of positions. Raises BadInput as ``coupling`` does."""
+    """Coupling from sums over windows; rate: Hz; differenced: True if the outputs are differences of positions. Raises BadInput as ``coupling``."""
     suu, syu, syy = spectra.inputs, spectra.between, spectra.outputs
     every = np.arange(suu.shape[0]) * rate / shape.length
     used = np.flatnonzero((every > 2 * rate / shape.length) & (every >= band[0]) & (every <= band[1]))
@@ -192,12 +192,12 @@ def coupling_of(
         at_most=most,
         windows=spectra.windows,
         seconds=seconds,
-        needed=seconds * max(float(np.max(most)) / SUFFICES, 1.0) ** 2,  # the limit falls with the root of the number of windows
+        needed=seconds * max(float(np.max(most)) / SUFFICES, 1.0) ** 2,  # the limit falls with the square root of the number of windows
     )
 
 
 def single(found: Coupling, output: int, driven: int, recording: Recording) -> FrequencyResponse:
-    """One of the four responses, as any other."""
+    """One of the four responses as a FrequencyResponse."""
     return FrequencyResponse(
         frequency=found.frequency,
         response=found.response[:, output, driven],
@@ -213,7 +213,7 @@ def single(found: Coupling, output: int, driven: int, recording: Recording) -> F
 
 
 def _of_recording(recording: Recording, u: FloatArray, y: FloatArray, shape: WindowShape) -> CrossSpectra:
-    """Of all windows of a recording, with positions differenced; (n, 2) inputs and outputs."""
+    """Sums over all windows of a recording, positions differenced; u, y: (n, 2) inputs and outputs."""
     running = RunningCrossSpectra(shape)
     for run in recording.runs():
         moved = (
@@ -231,26 +231,26 @@ def _of_recording(recording: Recording, u: FloatArray, y: FloatArray, shape: Win
 
 
 def _by_band(frequency: FloatArray, response: ComplexArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Edges (b + 1,) Hz, and coupling and its 95 % limit (b,): rms over the lines of each band, less what noise adds."""
+    """Edges (b + 1,) Hz, coupling and its 95 % limit (b,): rms over the lines of each band, minus the contribution of noise."""
     edges = np.geomspace(frequency[0], frequency[-1] * (1 + 1e-9), BANDS + 1)
     place = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, BANDS - 1)
     there = np.unique(place)
     size, most = np.zeros(there.size), np.zeros(there.size)
     for k, band in enumerate(there):
         inside = place == band
-        own = np.sqrt(np.prod([np.mean(np.abs(response[inside, i, i]) ** 2) for i in (0, 1)]))  # an antiresonance is no coupling
+        own = np.sqrt(np.prod([np.mean(np.abs(response[inside, i, i]) ** 2) for i in (0, 1)]))  # mean in the band
         for i, j in ((0, 1), (1, 0)):
             power = float(np.mean(np.abs(response[inside, i, j]) ** 2) / own)
             noise = float(np.mean(sigma[inside, i, j] ** 2) / own)
             real = max(power - noise, 0.0)
-            spread = np.sqrt((noise**2 + 2.0 * noise * real) / max(inside.sum() / 2.0, 1.0))  # neighbouring lines share half
+            spread = np.sqrt((noise**2 + 2.0 * noise * real) / max(inside.sum() / 2.0, 1.0))  # neighbouring lines are correlated by half
             size[k] = max(size[k], np.sqrt(max(power - noise - 2.0 * spread, 0.0)))
             most[k] = max(most[k], np.sqrt(real + 2.0 * spread))
     return np.append(edges[there], edges[there[-1] + 1]), size, most
 
 
 def _lasting(seconds: float) -> str:
-    """A recording of that length, for people."""
+    """A recording length as text."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds > 2.0 * size:
             return f"a recording of about {_figures(seconds / size)} {unit}"
@@ -258,5 +258,5 @@ def _lasting(seconds: float) -> str:
 
 
 def _figures(value: float) -> str:
-    """Two of them, without an exponent."""
+    """A number with two significant digits, without an exponent."""
     return f"{float(f'{value:.2g}'):.10g}"

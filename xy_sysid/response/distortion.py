@@ -1,8 +1,8 @@
-"""How far is an axis from linear? Even and odd distortion, read where a multisine left lines free.
+"""Nonlinearity of an axis: even and odd distortion, measured on lines that a multisine left free.
 
-An odd multisine puts no power on even lines: what is there is even distortion (a law that differs between the directions).
-Odd lines that were left out show odd distortion (friction, dead zone, saturation). What repeats from period to period is
-distortion, what does not is noise. (Pintelon & Schoukens, System Identification, 2nd ed., sec. 4.3)
+An odd multisine has no power on even lines: output there is even distortion (a law that differs between the directions).
+Omitted odd lines show odd distortion (friction, dead zone, saturation). The part that repeats in every period is
+distortion, the rest is noise. (Pintelon & Schoukens, System Identification, 2nd ed., sec. 4.3)
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 
 from xy_sysid.samples.block import FloatArray
 
-NEAR = 8  # lines to each side among which an excited one must be
-EXCITED, FREE = 0.5, 0.1  # of the strongest near: an excited line, a free line
-WEAK = 1e-3  # of the strongest of all: nothing is excited below
+NEAR = 8  # lines on each side of a free line among which there must be an excited one
+EXCITED, FREE = 0.5, 0.1  # of the strongest line nearby: an excited line, a free line
+WEAK = 1e-3  # of the strongest line overall: weaker ones are not excited
 FEWEST = 3  # periods after the first, and free lines
 SURE = 4.0  # standard deviations above noise
-NO_POWER = 0.02  # share of excited lines that may be even by chance
-GROUPS = 12  # of free lines, for a spectrum that people can read
+NO_POWER = 0.02  # fraction of excited lines that may be even by chance
+GROUPS = 12  # of free lines, for a readable spectrum
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
     """Distortion of one kind: on free lines, in velocity.
 
-    level: of distortion over the excited lines' output, mean power, dB; noise: the same of what does not repeat
-    over_noise: power ratio; seen: beyond what noise explains
+    level: distortion relative to the output on excited lines, mean power, dB; noise: the same for the part that does not repeat
+    over_noise: power ratio; seen: True if it exceeds what noise explains
     frequency: (g,) Hz, groups of free lines; level_db, noise_db: (g,) as above
     """
 
@@ -45,7 +45,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Distortion:
-    """The split of one axis; odd is None where no odd line was left out."""
+    """The distortion of one axis; odd is None if no odd line was left free."""
 
     period: int
     periods: int
@@ -68,9 +68,9 @@ def _words(part: Part) -> str:
 
 
 def distortion(sampling_rate: float, u: FloatArray, y: FloatArray, period: int) -> Distortion | None:
-    """Split a gap-free run (n,) whose input repeats after so many samples; None if it leaves no even lines free.
+    """Distortion of a gap-free run (n,) whose input has this period in samples; None if it leaves no even lines free.
 
-    The first period is left out, and what little input the free lines have (centring) is taken away to first order.
+    The first period is left out, and the small input on the free lines (centring) is corrected to first order.
     """
     velocity = np.diff(y) * sampling_rate
     periods = velocity.size // period - 1

@@ -22,7 +22,7 @@ Z95 = 1.959963984540054  # sigmas to each side of a 95 % interval: 97.5 % of the
 
 
 def _algebra(name: str) -> Callable[..., FrequencyResponse]:
-    """One of its functions; it makes responses itself, so it is imported when it is used."""
+    """A method that calls a function of ``algebra``, imported on use because that module imports this one."""
     found: Callable[..., FrequencyResponse] = getattr(importlib.import_module("xy_sysid.response.algebra"), name)
     return found
 
@@ -100,7 +100,7 @@ class FrequencyResponse:
         return f"<FrequencyResponse{told}: {lines}, {self.averages:.1f} averages, {over(self.output_unit, self.input_unit)}>"
 
     def select(self, lines: NDArray[np.bool_] | slice) -> FrequencyResponse:
-        """The same response at some of its lines."""
+        """The response at some of its lines."""
         return replace(
             self,
             frequency=self.frequency[lines],
@@ -113,21 +113,21 @@ class FrequencyResponse:
         )
 
     def __add__(self, other: Any) -> FrequencyResponse:
-        """Sum with a response, a transfer function or a number; errors are taken to be independent. Raises BadInput for other units."""
+        """Sum with a response, a transfer function or a number; errors are taken to be independent. Raises BadInput if units differ."""
         return _algebra("added")(self, other)
 
     def __sub__(self, other: Any) -> FrequencyResponse:
-        """Difference; see the sum."""
+        """Difference; see ``__add__``."""
         return _algebra("added")(self, other, -1.0)
 
     def __mul__(self, other: Any) -> FrequencyResponse:
-        """Series connection ``plant * controller``. Raises BadInput if the output of the other is not the input of this one."""
+        """Series connection ``plant * controller``. Raises BadInput if the controller's output is not the plant's input."""
         return _algebra("multiplied")(self, other)
 
     __rmul__ = __mul__
 
     def inverse(self) -> FrequencyResponse:
-        """Input over output."""
+        """The inverse response: input over output."""
         return _algebra("inverted")(self)
 
     def closed_loop(self, controller: Any) -> FrequencyResponse:

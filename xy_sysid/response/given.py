@@ -1,4 +1,4 @@
-"""A frequency response that was measured elsewhere --> FrequencyResponse, with an uncertainty from its coherence or its own roughness."""
+"""A frequency response measured elsewhere -> FrequencyResponse, with an uncertainty from its coherence or its own scatter."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Origin
 
-FEWEST = 8  # lines; fewer tell no transfer function
-NEIGHBOURS = 7  # lines through which a parabola is laid: what it leaves of the middle one is noise
-KNOWN = 100.0  # averages that a sigma which was given counts as: it is known to 7 %
-SMALLEST = 1e-6  # of the response: no line is more exact than what files keep
+FEWEST = 8  # lines; fewer do not determine a transfer function
+NEIGHBOURS = 7  # lines to which a parabola is fitted; the residual of the middle one is noise
+KNOWN = 100.0  # number of averages assumed for a given sigma: it is known to 7 %
+SMALLEST = 1e-6  # of the response: numbers in files are not more accurate
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What is known of a response beside its values.
+    """Additional information on a response.
 
     sigma: (m,) standard deviation of the complex error; coherence: (m,) 0..1; averages: independent averages behind the coherence
     sampling_rate: Hz, twice the highest line if it is not known
@@ -78,7 +78,7 @@ def given_response(
 
 
 def _sigma(f: FloatArray, h: ComplexArray, told: dict[str, FloatArray], averages: float | None) -> tuple[FloatArray, float, str]:
-    """(m,) sigma, the averages that it counts as, and where it comes from."""
+    """(m,) sigma, the equivalent number of averages, and the origin of sigma."""
     if "sigma" in told:
         return told["sigma"], averages or KNOWN, "the uncertainty is the standard deviation of the file"
     if "coherence" in told and averages:
@@ -93,7 +93,7 @@ def _sigma(f: FloatArray, h: ComplexArray, told: dict[str, FloatArray], averages
 
 
 def _roughness(f: FloatArray, h: ComplexArray) -> tuple[FloatArray, float]:
-    """(m,) scatter about a local parabola over the logarithm of frequency, and its degrees of freedom; neighbours are scaled to one size."""
+    """(m,) scatter about a local parabola over log frequency, and its degrees of freedom; neighbours are scaled to one size."""
     width = min(NEIGHBOURS, f.size)
     x = np.log(f)
     error = np.empty(f.size)

@@ -1,4 +1,4 @@
-"""From spectra to the frequency response: the H1 estimator, its coherence, its sigma and which lines to trust.
+"""From spectra to the frequency response: the H1 estimator, its coherence, its sigma and its trusted lines.
 
 H1 = Gyx / Gxx; sigma^2 = (Gyy - |Gyx|^2 / Gxx) / Gxx / (averages - 1) is the variance of the complex error.
 (Bendat & Piersol, Random Data, 4th ed., eq. 6.37 and 9.90; Pintelon & Schoukens, System Identification, 2nd ed., sec. 2.5)
@@ -18,15 +18,15 @@ from xy_sysid.response.spectra import Spectra
 from xy_sysid.response.windows import WindowShape, blur_kernel, error_correlation
 from xy_sysid.samples.block import FloatArray
 
-NOISE_SMOOTHING = 2  # lines to each side over which the noise power is averaged: it steadies sigma when windows are few
-PERIODIC_COHERENCE = 0.9  # a line of a periodic input repeats itself; one that does not is feedback or noise between the excited ones
-MARGIN = 8  # lines beside the band that its own lines need (smoothing, main lobe)
-STRONG = 0.9  # quantile of the input power in the band that is called strong
-EXCITED = 1e-3  # a line is excited when its input power is above this share of the strong lines' power
+NOISE_SMOOTHING = 2  # lines to each side over which the noise power is averaged: it stabilises sigma if windows are few
+PERIODIC_COHERENCE = 0.9  # a line of a periodic input has a high coherence; a low one is feedback or noise between the excited lines
+MARGIN = 8  # lines outside the band that its lines need (smoothing, main lobe)
+STRONG = 0.9  # quantile of the input power in the band that counts as strong
+EXCITED = 1e-3  # a line is excited if its input power is above this fraction of the strong lines' power
 
 
 def main_lobe(shape: WindowShape) -> int:
-    """Half width of the taper's main lobe in lines; nearer to zero frequency the removed mean spoils an estimate."""
+    """Half width of the taper's main lobe in lines; closer to 0 Hz the removed mean biases an estimate."""
     return {"boxcar": 1, "hann": 2, "hamming": 2, "blackman": 3, "blackmanharris": 4, "flattop": 5}.get(shape.name, 4)
 
 
@@ -44,15 +44,15 @@ def divisor(frequency: FloatArray, sampling_rate: float) -> ComplexArray:
 
 @dataclass(frozen=True, slots=True)
 class H1Options:
-    """What to make of spectra.
+    """Options of the estimate.
 
-    differenced:   the output's forward difference went into them, and not the output itself
-    periodic:      the window is a whole number of periods of the input, so that nothing leaks and only the excited lines
+    differenced:   True if the spectra are of the output's forward difference, not of the output itself
+    periodic:      the window is an integer number of periods of the input, so that there is no leakage and only the excited lines
                    carry information
     band:          Hz, from and to
     min_coherence: least of a line that is trusted
     units:         of input and output
-    rate_error:    standard error of the sampling rate, relative
+    rate_error:    relative standard error of the sampling rate
     repeated:      least coherence of a line of a periodic input; less of a reference, which no feedback can make
     """
 
@@ -66,7 +66,7 @@ class H1Options:
 
 
 def frequency_response(spectra: Spectra, shape: WindowShape, sampling_rate: float, options: H1Options) -> FrequencyResponse:
-    """The response of one axis at the lines inside the band, zero frequency left out.
+    """The response of one axis at the lines inside the band, except 0 Hz.
 
     With fewer than two effective averages sigma is infinite and no line is trusted.
     """
@@ -125,7 +125,7 @@ def frequency_response(spectra: Spectra, shape: WindowShape, sampling_rate: floa
 
 @lru_cache(maxsize=8)
 def _amplitude(shape: WindowShape) -> FloatArray:
-    """(j,) transform of the centred window at the kernel's half lines: the root of the kernel, with its sign."""
+    """(j,) transform of the centred window at the kernel's half lines: the signed square root of the kernel."""
     kernel = _kernel(shape)
     half = (kernel.shape[0] - 1) // 2
     offset = np.arange(-half, half + 1)
@@ -134,10 +134,10 @@ def _amplitude(shape: WindowShape) -> FloatArray:
 
 
 def _pairs(spectra: Spectra, shape: WindowShape) -> FloatArray:
-    """(n,) share of the pairs of windows that lie 0, 1, .. hops apart.
+    """(n,) fraction of the pairs of windows that are 0, 1, .. hops apart.
 
-    Worked out from what the noise's correlation sums up to; every distance up to the overlap is taken to be as frequent as
-    any other (true without gaps and with slow forgetting).
+    Calculated from the sum of the noise's correlation. All distances up to the overlap are assumed to be equally
+    frequent (true without gaps and with slow forgetting).
     """
     if spectra.weight <= 0:
         return np.ones(1)
@@ -149,16 +149,16 @@ def _pairs(spectra: Spectra, shape: WindowShape) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _unmixing(shape: WindowShape) -> FloatArray:
-    """(2, LINES_APART) least squares: from the sums of the errors' correlation to the shares of windows 0, and 1 or more, hops apart."""
+    """(2, LINES_APART) least squares: from the sums of the errors' correlation to the fractions of windows 0, and 1 or more, hops apart."""
     correlation = error_correlation(shape)
     return np.asarray(np.linalg.pinv(np.stack((correlation[0], 2.0 * np.sum(correlation[1:], axis=0)), axis=1)))
 
 
 def _excited(gxx: FloatArray, inside: slice, reach: int) -> NDArray[np.bool_]:
-    """Lines whose input power, and that of all their neighbours within the window's main lobe, is not negligible."""
+    """Lines whose input power, and that of all neighbours within the window's main lobe, is not negligible."""
     own = gxx[inside]
     place = int(STRONG * (own.size - 1))
-    strong = max(float(np.partition(own, place)[place]), float(own.mean())) if own.size else 0.0  # of a narrow band the mean is more
+    strong = max(float(np.partition(own, place)[place]), float(own.mean())) if own.size else 0.0  # in a narrow band the mean is larger
     if reach == 0 and strong < float(own.max(initial=0.0)) * EXCITED:
         strong = float(own.max(initial=0.0))
     above = gxx > EXCITED * strong
@@ -173,7 +173,7 @@ def _excited(gxx: FloatArray, inside: slice, reach: int) -> NDArray[np.bool_]:
 
 @compiled
 def smoothed(power: FloatArray, width: int) -> FloatArray:
-    """(m,) mean over ``width`` lines (odd) around each; the first and the last line stand for those beyond them."""
+    """(m,) mean over ``width`` lines (odd) around each; beyond the ends the first and last line are repeated."""
     half, last = width // 2, power.shape[0] - 1
     out = np.zeros(power.shape[0])
     for shift in range(-half, half + 1):

@@ -1,9 +1,9 @@
-"""The local polynomial method: a response and the transients of each window, as polynomials of the lines around each line.
+"""The local polynomial method: the response and the transients of each window as polynomials over the lines around each line.
 
-Within 2 n + 1 lines around line k, a window's spectrum is Y(k + r) = G(k + r) U(k + r) + T(k + r) + V. G and the transient T, by which the
-ends of a window leak, are smooth, so each is a polynomial in r; linear least squares tells both apart, because U is rough. All windows share
-G and each has its own T, which is projected out. No taper is put on the samples, so nothing is blurred: records of few windows and sharp
-resonances have less bias and less variance than by H1. (Pintelon, Schoukens, Vandersteen & Barbé, Mech. Syst. Signal Process. 24 (2010), 573-595;
+Within 2 n + 1 lines around line k, a window's spectrum is Y(k + r) = G(k + r) U(k + r) + T(k + r) + V. G and the transient T (leakage from the
+ends of a window) are smooth, so each is a polynomial in r. Linear least squares separates them, because U is rough. All windows share
+G. Each has its own T, which is projected out. The samples have no taper, so nothing is smoothed: with few windows and sharp
+resonances, bias and variance are smaller than with H1. (Pintelon, Schoukens, Vandersteen & Barbé, Mech. Syst. Signal Process. 24 (2010), 573-595;
 Pintelon & Schoukens, System Identification, 2nd ed., sec. 7.2.2)
 
 The local rational method gives G a denominator: (1 + a1 r + a2 r^2) Y = B U + T, which follows a resonance that is narrower than the lines used
@@ -25,19 +25,19 @@ from xy_sysid.response.spectra import State
 from xy_sysid.response.windows import Window, WindowShape
 from xy_sysid.samples.block import FloatArray
 
-ORDER = 2  # of both polynomials
-POLES = 2  # of the local rational method's denominator
+ORDER = 2  # order of both polynomials
+POLES = 2  # order of the local rational method's denominator
 SIDE = 6  # lines to each side: 13 lines for 6 unknowns of a single window, and 8 of the rational one
-EXCITED = 1e-3  # a line is excited when the power around it is above this share of the strong lines' power
+EXCITED = 1e-3  # a line is excited if the power around it is above this fraction of the strong lines' power
 STRONG = 0.9  # quantile of the input power in the band that is called strong
-CORRELATED = 0.02  # correlation of two lines' errors that is left out
+CORRELATED = 0.02  # a smaller correlation of two lines' errors is neglected
 
 
 @dataclass(frozen=True, slots=True)
 class LocalSums:
     """Normal equations of each line, summed over windows.
 
-    normal: (lines, p, p), right: (lines, p), power: (lines,) of what is explained; gxx: (lines,) input power; weight, square: sums of the windows'
+    normal: (lines, p, p), right: (lines, p), power: (lines,) of the data to explain; gxx: (lines,) input power; weight, square: sums of the windows'
     weights and of their squares
     """
 
@@ -51,7 +51,7 @@ class LocalSums:
 
 @lru_cache(maxsize=8)
 def _around(lines: int) -> tuple[np.ndarray, FloatArray, FloatArray]:
-    """(lines, 2 n + 1) lines around each, never the one at 0 Hz; their distance in n; the projection that takes polynomials out."""
+    """(lines, 2 n + 1) indices of the lines around each, never 0 Hz; their distance in n; the projection that removes polynomials."""
     first = np.clip(np.arange(lines) - SIDE, 1, max(lines - 1 - 2 * SIDE, 1))
     place = first[:, None] + np.arange(2 * SIDE + 1)[None, :]
     distance = (place - np.arange(lines)[:, None]) / SIDE
@@ -61,7 +61,7 @@ def _around(lines: int) -> tuple[np.ndarray, FloatArray, FloatArray]:
 
 
 def of_window(u: FloatArray, y: FloatArray, rational: bool) -> LocalSums:
-    """The sums of one window: input and output (n,), the latter differenced if it is to be."""
+    """The sums of one window: input and output (n,); y is already differenced if needed."""
     inputs, outputs = np.fft.rfft(u - u.mean()), np.fft.rfft(y - y.mean())
     place, distance, free = _around(inputs.size)
     around, seen = inputs[place], outputs[place] @ free
@@ -81,7 +81,7 @@ def of_window(u: FloatArray, y: FloatArray, rational: bool) -> LocalSums:
 
 
 def added(old: LocalSums | None, new: LocalSums, keep: float = 1.0) -> LocalSums:
-    """Both together, the old ones forgotten by a factor."""
+    """The sum of both, the old one multiplied by ``keep``."""
     if old is None:
         return new
     return LocalSums(
@@ -101,7 +101,7 @@ class LocalTransformer:
         self._differenced, self._rational = differenced, rational
 
     def __call__(self, window: Window) -> list[LocalSums]:
-        """One for each axis of the window."""
+        """One LocalSums for each axis of the window."""
         output = np.diff(window.position, axis=0) if self._differenced else window.position
         return [of_window(u, y, self._rational) for u, y in zip(window.voltage.T, output.T, strict=True)]
 
@@ -110,20 +110,20 @@ class RunningLocal:
     """update(window) and get(), as ``RunningSpectra``, of the normal equations."""
 
     def __init__(self, forget: float = 1.0, sliding: int = 0) -> None:
-        """forget: factor of what is old, a window; sliding: only so many windows, 0 for all."""
+        """forget: factor for old sums, per window; sliding: number of windows to keep, 0 for all."""
         self._forget, self._sum = forget, None  # type: tuple[float, LocalSums | None]
         self._kept: deque[LocalSums] = deque(maxlen=sliding or None)
         self._sliding = sliding
 
     def update(self, window: LocalSums) -> None:
-        """Take one more window."""
+        """Add one window."""
         if self._sliding:
             self._kept.append(window)
         else:
             self._sum = added(self._sum, window, self._forget)
 
     def get(self) -> LocalSums:
-        """The sums so far; there has been a window."""
+        """The sums so far; needs at least one window."""
         total = self._sum
         for window in self._kept:
             total = added(total, window)
@@ -131,13 +131,13 @@ class RunningLocal:
         return total
 
     def state(self) -> State:
-        """Everything needed to go on later, as arrays."""
+        """The state as arrays, to continue later."""
         kept = list(self._kept) if self._sliding else [self._sum] if self._sum is not None else []
         names = ("normal", "right", "power", "gxx", "weight", "square")
         return {name: np.array([getattr(one, name) for one in kept]) for name in names}
 
     def restore(self, state: State) -> None:
-        """Go on from a state of the same shape."""
+        """Continue from a state of the same shape."""
         self._kept.clear()
         self._sum = None
         for k in range(len(state["weight"])):
@@ -156,9 +156,9 @@ class RunningLocal:
 
 
 def local_response(sums: LocalSums, shape: WindowShape, sampling_rate: float, options: H1Options) -> FrequencyResponse:
-    """The response of one axis at the lines inside the band, 0 Hz left out.
+    """The response of one axis at the lines inside the band, except 0 Hz.
 
-    Coherence is that of a line with the noise and the response that were found. Errors of lines within 2 n of each other are correlated.
+    Coherence is computed from the estimated noise and response. Errors of lines within 2 n of each other are correlated.
     """
     every = np.arange(sums.power.size) * sampling_rate / shape.length
     inside = np.flatnonzero((every > 0) & (every >= options.band[0]) & (every <= min(options.band[1], 0.5 * sampling_rate)))
@@ -202,7 +202,7 @@ def local_response(sums: LocalSums, shape: WindowShape, sampling_rate: float, op
 
 @lru_cache(maxsize=1)
 def _correlation() -> FloatArray:
-    """Of the errors of lines 0, 1, .. apart: that of the weights with which a polynomial's middle takes the lines around it."""
+    """Correlation of the errors of lines 0, 1, .. apart, from the weights that a polynomial's middle gives to its neighbours."""
     smooth = np.vander(np.arange(-SIDE, SIDE + 1) / SIDE, ORDER + 1, increasing=True)
     weights = np.linalg.pinv(smooth)[0]
     shared = np.correlate(weights, weights, "full")[weights.size - 1 :]

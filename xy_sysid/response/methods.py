@@ -1,4 +1,4 @@
-"""The ways to a frequency response: each turns windows into sums, adds them up, and makes a response of the sums. One row of METHODS each."""
+"""The methods for a frequency response. Each turns windows into sums, adds these, and computes the response. One row of METHODS per method."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ class Running(Protocol):
     """Sums over windows."""
 
     def update(self, window: Any) -> None:
-        """Take one more window."""
+        """Add one window."""
 
     def get(self) -> Any:
         """The sums so far."""
 
     def state(self) -> State:
-        """Everything needed to go on later, as arrays."""
+        """The state as arrays, to continue later."""
 
     def restore(self, state: State) -> None:
-        """Go on from a state of the same shape."""
+        """Continue from a state of the same shape."""
 
 
 @dataclass(frozen=True, slots=True)
 class ResponseMethod:
-    """How a frequency response is estimated.
+    """A method that estimates a frequency response.
 
-    reference: it needs one; tapered: windows overlap and have a taper, as the settings say, else they lie side by side as they are
-    transform: (shape, differenced) -> what turns a window into what ``running`` adds up; running: (shape, forget, sliding)
-    whole:     (pieces, shape, differenced) -> the sums of whole stretches; estimate: (sums, shape, rate, options) -> the response
-    windows:   sums -> how many windows are in them
+    reference: True if it needs one; tapered: True if windows overlap and have a taper (settings), else they are adjacent and rectangular
+    transform: (shape, differenced) -> function from a window to the input of ``running``; running: (shape, forget, sliding)
+    whole:     (pieces, shape, differenced) -> the sums over full stretches; estimate: (sums, shape, rate, options) -> the response
+    windows:   sums -> number of windows in them
     """
 
     reference: bool
@@ -57,7 +57,7 @@ class ResponseMethod:
     note: str = ""
 
     def shape(self, window: str, length: int, overlap: float) -> WindowShape:
-        """Of the windows that it takes."""
+        """The shape of the method's windows."""
         return WindowShape.of(window, length, overlap) if self.tapered else WindowShape.of("boxcar", length, 0.0)
 
 

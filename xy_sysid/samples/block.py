@@ -1,6 +1,6 @@
 """A block of consecutive samples, as it travels in one std_msgs/Float64MultiArray.
 
-Rows are samples; columns are ``seq,time`` and then one per axis. Nothing here knows ROS: a message is its column names
+Rows are samples; columns are ``seq,time`` and then one per axis. This file does not depend on ROS: a message is its column names
 and its numbers.
 """
 
@@ -52,7 +52,7 @@ class Samples:
     voltage:  (n, axes)
     position: (n, axes)
     time:     (n,) stamps of the position, s, where they are known
-    reference: (n, axes) what a controller was told at that time, where it is asked for
+    reference: (n, axes) the controller's reference at that time, if requested
     """
 
     seq: int
@@ -65,7 +65,7 @@ class Samples:
         return int(self.voltage.shape[0])
 
     def rows(self, first: int, last: int) -> Samples:
-        """The samples from the ``first`` to before the ``last`` of these."""
+        """The samples from index ``first`` to before ``last``."""
         part = slice(first, last)
         time, reference = (None if values is None else values[part] for values in (self.time, self.reference))
         return Samples(seq=self.seq + first, voltage=self.voltage[part], position=self.position[part], time=time, reference=reference)
@@ -82,7 +82,7 @@ def pack(block: Block) -> FloatArray:
 
 
 def unpack(label: str, rows: int, width: int, data: FloatArray) -> Block:
-    """The block that a message holds.
+    """The block in a message.
 
     label: ``layout.dim[1].label``; rows, width: the sizes of dim[0] and dim[1]; data: the message's numbers.
     Raises BadInput if the columns are not ``seq,time,<axis>...`` or the sizes do not fit the data.

@@ -1,7 +1,7 @@
-"""Velocity --> position: the one whose mean velocity from each sample to the next is exactly what was measured, so that noise stays white.
+"""Velocity to position: a position whose mean velocity from each sample to the next equals the measured one, so that noise stays white.
 
-What was measured at an instant then stands for the step after it, so a delay found from it contains half a sample (a whole
-one where the drive itself differences its encoder over the last sample), which ``integrated`` says.
+A value measured at an instant then counts for the following step. Therefore a delay that is found from it contains half a sample (a full
+one if the drive itself differences its encoder over the last sample); ``integrated`` says so.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import numpy as np
 
 from xy_sysid.samples.block import FloatArray
 
-FAR = 1e9  # of any unit; beyond it a position becomes coarse in a double, and begins again
+FAR = 1e9  # of any unit; beyond it a double is too coarse for a position, and the integral restarts at 0
 
 
 def integral(values: FloatArray, lasting: FloatArray, start: FloatArray | float = 0.0) -> FloatArray:
-    """(n, axes) sum of (n, axes) values up to before each sample, from ``start`` on. lasting: (n - 1,) s from each to the next.
+    """(n, axes) cumulative sum of (n, axes) values before each sample, starting at ``start``. lasting: (n - 1,) s from each sample to the next.
 
     Over a gap the last value is held.
     """
@@ -23,7 +23,7 @@ def integral(values: FloatArray, lasting: FloatArray, start: FloatArray | float 
 
 
 def detrended(values: FloatArray) -> FloatArray:
-    """(n,) less their straight line."""
+    """(n,) without their straight line."""
     if values.size < 3:
         return values
     line = np.column_stack((np.ones(values.size), np.arange(values.size) / values.size))
@@ -31,7 +31,7 @@ def detrended(values: FloatArray) -> FloatArray:
 
 
 def integrated(unit: str = "", rate: float | None = None) -> str:
-    """What is to be known of a velocity that was integrated. unit: its own; rate: Hz; where they are known."""
+    """A note on an integrated velocity. unit: its own; rate: Hz; both if known."""
     named, half = f" ({unit})" if unit else "", "" if rate is None else f" ({0.5e3 / rate:.3g} ms)"
     return (
         f"the output is a velocity{named}: it is integrated, so positions count from 0; "
@@ -40,7 +40,7 @@ def integrated(unit: str = "", rate: float | None = None) -> str:
 
 
 class Path:
-    """add(seq, velocity, period) -> positions, for samples that come in one by one or in blocks of any length."""
+    """add(seq, velocity, period) -> positions, for samples that arrive one by one or in blocks of any length."""
 
     def __init__(self, axes: int) -> None:
         self._place, self._velocity, self._seq = np.zeros(axes), np.zeros(axes), np.nan
@@ -48,8 +48,8 @@ class Path:
     def add(self, seq: FloatArray, velocity: FloatArray, period: float) -> FloatArray:
         """(n, axes) positions. seq: (n,) counters; velocity: (n, axes); period: s of one sample.
 
-        A row with anything that is no number stays without one, and leaves no trace in what follows; neither does one that
-        would lead beyond ``FAR``, after which positions count from 0 again. A counter that goes back adds nothing.
+        A row with a NaN has no position and does not affect the following rows; neither does one that
+        would lead beyond ``FAR``, after which positions restart at 0. A counter that goes back adds nothing.
         """
         found = np.full(velocity.shape, np.nan)
         rows = np.flatnonzero(np.isfinite(velocity).all(axis=1) & np.isfinite(seq))

@@ -1,6 +1,6 @@
-"""Which numbers of a joint state are taken (sensor_msgs/JointState), and in words why a message gives none.
+"""The fields of a joint state that are used (sensor_msgs/JointState), and why a message is not usable.
 
-Drivers leave fields empty, or fill them with NaN, that they do not know: of a wheel often the position, of many drives the effort.
+Drivers leave unknown fields empty or fill them with NaN: often the position of a wheel, and the effort of many drives.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ INSTEAD: dict[JointField, JointOutput] = {"position": "velocity", "velocity": "p
 def joints_of(axes: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, str]:
     """The joint of each axis, from entries like ``x=shoulder_pan_joint``; an axis without one is named like its joint.
 
-    Raises BadInput for an entry that is none, an axis that is not there, and a joint or an axis named twice.
+    Raises BadInput for an invalid entry, an unknown axis, and a joint or an axis named twice.
     """
     found = {axis: axis for axis in axes}
     named: set[str] = set()
@@ -43,7 +43,7 @@ class JointMessage(Protocol):
 
     @property
     def name(self) -> Sequence[str]:
-        """Of the joints."""
+        """Names of the joints."""
 
     @property
     def position(self) -> Sequence[float]:
@@ -59,23 +59,23 @@ class JointMessage(Protocol):
 
 
 class JointReader:
-    """wrong(message) -> why it gives nothing, empty if it does; row(message) -> (wanted fields x joints,) numbers."""
+    """wrong(message) -> why it is not usable, empty if it is; row(message) -> (wanted fields x joints,) numbers."""
 
     def __init__(self, joints: dict[str, str], output: JointOutput, effort: bool) -> None:
-        """joints: the joint of each axis; output: the field that is the output; effort: whether the effort is wanted, too."""
+        """joints: the joint of each axis; output: the field used as output; effort: True if the effort is used, too."""
         self._axis, self._names = next(iter(joints)), tuple(joints.values())
         self._wanted: tuple[JointField, ...] = (output, "effort") if effort else (output,)
         self._heard = False
-        self._known: set[JointField] = set()  # fields that have had numbers for all joints; NaN in between is a fault of single samples
+        self._known: set[JointField] = set()  # fields that have had numbers for all joints; a later NaN is a fault of single samples
 
     def of_others(self, message: JointMessage) -> bool:
-        """Whether it is of other joints alone, while ours have been heard: several publishers may share the topic, as for a gripper."""
+        """True if it only has other joints while ours have been received: several publishers may share the topic, for example for a gripper."""
         ours = not set(self._names).isdisjoint(message.name)
         self._heard = self._heard or ours
         return self._heard and not ours
 
     def wrong(self, message: JointMessage) -> str:
-        """What is lacking, and what to do about it."""
+        """The missing data and how to provide it; empty if the message is usable."""
         missing = [name for name in self._names if name not in message.name]
         if missing:
             expected = f"joints {', '.join(message.name)}; expected {', '.join(self._names)}"
@@ -87,7 +87,7 @@ class JointReader:
         return ""
 
     def row(self, message: JointMessage) -> FloatArray:
-        """The output of each joint, and then the effort of each, if it is wanted."""
+        """The output of each joint, followed by the effort of each if it is used."""
         return np.concatenate([self._numbers(message, field) for field in self._wanted])
 
     def _numbers(self, message: JointMessage, field: JointField) -> FloatArray:
@@ -95,7 +95,7 @@ class JointReader:
         return np.array([values[message.name.index(name)] for name in self._names], dtype=np.float64)
 
     def _lack(self, message: JointMessage, field: JointField) -> str:
-        """Empty if there are numbers."""
+        """The missing data of a field; empty if there are numbers."""
         number = len(getattr(message, field))
         if number != len(message.name):
             return f"{PLURAL[field]} are {'empty' if number == 0 else f'{number} for {len(message.name)} joints'}"

@@ -1,6 +1,6 @@
-"""Samples that carry a stamp and no counter (sensor_msgs/JointState) become counted samples, so that they pair like blocks.
+"""Converts samples with a time stamp and no counter (sensor_msgs/JointState) to counted samples, so that they pair like blocks.
 
-Alone they are counted by their stamps, which may jitter (``stamp_counter``). With a voltage stream the counter is that of the
+Without a voltage stream they are counted by their stamps, which may jitter (``stamp_counter``). With one, the counter is that of the
 voltage sample nearest in time.
 """
 
@@ -17,20 +17,20 @@ from xy_sysid.samples.joint_fields import JointOutput
 from xy_sysid.samples.ring import RATE_SAMPLES
 from xy_sysid.samples.stamp_counter import FOLLOW, StampCounter
 
-RESTART = 1.0  # s that a stamp must go back to mean that the source has started again
-APART = 1.0  # s between the newest stamps of voltage and joint states from which on they are not one clock
-ANCHORS = 20  # samples of voltage from which the rate is read at first
-SAME_RATE = 0.01  # part by which the rates of voltage and joint states may differ in what 200 jittering stamps tell
-CATCHING_UP = 0.2  # part by which steps of long stretches may leave the median step as long as it is believed
-LOOK, FEW_LOOK, MANY_LOOK = 2.0, RATE_SAMPLES // 2, 40_000  # s of stamps, and at least and most so many, after which the rate is looked at again
-OTHER_RATE = 1.01  # factor by which their counted and their mean step must both differ from it: losses change the mean alone, bursts the count alone
-COUNTED = 3  # rounds in which the step that stamps are counted by becomes that of the line through them
-STICKS = 0.8  # samples by which a sample may leave its voltage sample before it is given to another
-STILL = 20  # consecutive messages with one stamp that mean that they are not stamped
+RESTART = 1.0  # s that a stamp must go back to count as a restart of the source
+APART = 1.0  # s between the newest stamps of voltage and joint states above which they are not from one clock
+ANCHORS = 20  # samples of voltage for the first estimate of the rate
+SAME_RATE = 0.01  # relative difference allowed between the rates of voltage and joint states, estimated from 200 jittering stamps
+CATCHING_UP = 0.2  # relative difference allowed between the step over long stretches and the median step
+LOOK, FEW_LOOK, MANY_LOOK = 2.0, RATE_SAMPLES // 2, 40_000  # s of stamps, and least and greatest number, after which the rate is checked again
+OTHER_RATE = 1.01  # factor by which their counted and their mean step must both differ: losses change only the mean, bursts only the count
+COUNTED = 3  # iterations in which the counting step becomes that of the line through the stamps
+STICKS = 0.8  # samples by which a sample may deviate from its voltage sample before it is assigned to another
+STILL = 20  # consecutive messages with one stamp after which they count as unstamped
 
 
 def counted_step(times: FloatArray) -> float:
-    """s between samples, by a straight line through stamps that are counted by the usual step: losses and jitter do not change it, bursts do."""
+    """s between samples, by a straight line through stamps counted by the usual step: losses and jitter do not change it, bursts do."""
     step = float(np.median(np.diff(times)))
     for _ in range(COUNTED):
         count = _counted(times, step)
@@ -41,7 +41,7 @@ def counted_step(times: FloatArray) -> float:
 
 @compiled
 def _counted(times: FloatArray, step: float) -> FloatArray:
-    """Number of each stamp, by the even instants that follow them slowly: jitter does not add up."""
+    """Number of each stamp, on an even time grid that follows the stamps slowly: jitter does not accumulate."""
     count = np.zeros(times.shape[0])
     instant = times[0]
     for k in range(1, times.shape[0]):
@@ -53,7 +53,7 @@ def _counted(times: FloatArray, step: float) -> FloatArray:
 
 
 def usual_step(times: FloatArray) -> float:
-    """s between samples: the counted step, or where most cycles only catch up with a late one, that of a straight line."""
+    """s between samples: the counted step, or the step of a straight line if most cycles only catch up after a delay."""
     times = times[np.concatenate(([True], np.diff(np.maximum.accumulate(times)) > 0))]
     far = max(len(times) // 4, 1)
     step, mean = float(np.median(np.diff(times))), float(np.median(times[far:] - times[:-far])) / far
@@ -64,31 +64,31 @@ def usual_step(times: FloatArray) -> float:
 
 
 class JointCounter:
-    """add(time, row) -> a block of one or more counted samples, or None while the rate is not known yet."""
+    """add(time, row) -> a block of one or more counted samples, or None while the rate is unknown."""
 
     def __init__(self, axes: tuple[str, ...], with_voltage: bool, output: JointOutput = "position") -> None:
         """with_voltage: counters come from ``see_voltage``; otherwise from the stamps alone.
 
-        output: what the first ``axes`` numbers of each row are; velocities become positions
+        output: quantity of the first ``axes`` numbers of each row; velocities become positions
         """
         self._axes = axes
         self._path = Path(len(axes)) if output == "velocity" else None
         self._with_voltage = with_voltage
         self._rate: float | None = None
         self._anchor: tuple[float, float] | None = None  # (time, counter)
-        self._begin: tuple[float, float] | None = None  # the first of the voltage samples that the rate is read from
+        self._begin: tuple[float, float] | None = None  # first of the voltage samples for the rate
         self._early: list[tuple[float, FloatArray]] = []
         self._counter: StampCounter | None = None
-        self._undecided: deque[FloatArray] = deque()  # samples whose number is not known yet
+        self._undecided: deque[FloatArray] = deque()  # samples whose number is unknown so far
         self._offset: int | None = None  # from numbers to counters of the voltage
         self._stamps: deque[float] = deque(maxlen=RATE_SAMPLES)
         self._newest, self._still = 0.0, 0
-        self._latest = 0.0  # stamp of the newest sample that was not left out
-        self._since: list[float] = []  # stamps since the last look at the period
-        self._other = 0  # whether the last look found a longer step than was learnt (1), or a shorter one (-1)
+        self._latest = 0.0  # stamp of the newest used sample
+        self._since: list[float] = []  # stamps since the last check of the period
+        self._other = 0  # 1 if the last check found a longer step than the learned one, -1 for a shorter one, else 0
 
     def see_voltage(self, block: Block) -> None:
-        """Learn rate and place from the voltage stream; blocks may have one row."""
+        """Learn rate and counter from the voltage stream; blocks may have one row."""
         if not self._with_voltage or len(block) == 0 or not bool(np.isfinite(block.time).all()):
             return
         first, last = (float(block.time[0]), float(block.seq[0])), (float(block.time[-1]), float(block.seq[-1]))
@@ -99,14 +99,14 @@ class JointCounter:
             self._rate = (last[1] - self._begin[1]) / (last[0] - self._begin[0])
 
     def _goes_elsewhere(self, time: float, seq: float) -> bool:
-        """Whether the voltage has started again: its counter or time went back, or they no longer belong together."""
+        """True if the voltage has restarted: its counter or time went back, or they no longer match."""
         assert self._anchor is not None
         before_time, before_seq = self._anchor
         lapse = (seq - before_seq) / self._rate if self._rate is not None else time - before_time
         return seq <= before_seq or time <= before_time or abs(time - before_time - lapse) > APART
 
     def wrong(self) -> str:
-        """Why stamped samples cannot become counted ones, in words; empty if they can."""
+        """Why stamped samples cannot be counted, in words; empty if they can."""
         if not np.isfinite(self._newest):
             return "joint_states: the stamps are not finite; stamp each message with its instant."
         if self._still >= STILL:
@@ -129,7 +129,7 @@ class JointCounter:
         return ""
 
     def _own_rate(self) -> float | None:
-        """Hz, of the newest stamps, None while there are too few."""
+        """Hz, from the newest stamps, None while there are too few."""
         times = np.array(self._stamps)
         times = times[np.concatenate(([True], np.diff(times) > 0))] if times.size else times
         return 1.0 / counted_step(times) if times.size > RATE_SAMPLES // 2 else None
@@ -143,7 +143,7 @@ class JointCounter:
             self._stamps.append(time)
 
     def add(self, time: float, row: FloatArray) -> Block | None:
-        """One sample at its stamp in s, (axes,) or more numbers; a stamp that does not advance the counter gives None."""
+        """Add one sample with its stamp in s, (axes,) or more numbers; returns None for a stamp that does not advance the counter."""
         self._watch(time)
         if not np.isfinite(time):
             return None
@@ -169,7 +169,7 @@ class JointCounter:
         self._rate, self._anchor = 1.0 / period, (float(times[0]) - period, -1.0)
 
     def _learn_again(self, time: float) -> None:
-        """The driver may have come back at another rate, or the first one was learnt while it caught up with a stall: the newest stamps tell."""
+        """Estimate the rate again from the newest stamps: the driver may have changed it, or the first estimate was made during a delay."""
         self._since.append(time)
         count, seconds = len(self._since), time - self._since[0]
         if count < FEW_LOOK or (seconds < LOOK and count < MANY_LOOK):
@@ -178,7 +178,7 @@ class JointCounter:
         times, self._since = np.array(self._since), []
         steps = self._rate * np.array([counted_step(times), seconds / (count - 1)])
         other = int(np.all(steps > OTHER_RATE)) - int(np.all(steps < 1.0 / OTHER_RATE))
-        if other and other == self._other:  # a second time: all of these stamps came after the change
+        if other and other == self._other:  # for the second time: all of these stamps are from after the change
             self._rate, self._counter, other = 1.0 / usual_step(times), None, 0
         self._other = other
 
@@ -218,7 +218,7 @@ class JointCounter:
         return block
 
     def _place(self, number: int, instant: float) -> float:
-        """The counter of a sample: its number, or that of the voltage sample at the same instant; the same distance as long as it fits."""
+        """The counter of a sample: its number, or that of the voltage sample at the same instant, at a constant offset while it fits."""
         if not self._with_voltage:
             return float(number)
         assert self._rate is not None and self._anchor is not None

@@ -1,4 +1,4 @@
-"""One move in one direction, from rest to rest: too little to distinguish friction, load and inertia."""
+"""Detects a single move in one direction, from rest to rest: too little to distinguish friction, load and inertia."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
 
-RESTS = 0.05  # of the highest speed; slower is rest, or the last of a move
-BACK = 0.02  # of the way; less of it in the other direction is overshoot
+RESTS = 0.05  # of the highest speed; slower is rest, or the end of a move
+BACK = 0.02  # of the distance; a smaller reverse motion is overshoot
 ONE_MOVE = "the axis makes one move in one direction, from rest to rest"
 
 
 def one_move(position: FloatArray) -> bool:
-    """Whether the motion of a position (n,) is a single one."""
+    """True if a position (n,) makes a single move."""
     steps = np.diff(position)
     fastest = float(np.max(np.abs(steps), initial=0.0))
     moving = np.flatnonzero(np.abs(steps) > RESTS * fastest)
@@ -27,7 +27,7 @@ def one_move(position: FloatArray) -> bool:
 
 
 def several_moves(runs: Sequence[Run]) -> None:
-    """Raises BadInput where all that there is to judge by is one move."""
+    """Raises BadInput if the runs contain only one move."""
     if len(runs) == 1 and one_move(runs[0].position):
         act = "It cannot be analysed: record several moves in both directions, better 60 s of noise."
         raise BadInput(f"motion of axis {runs[0].axis}", "one move in one direction, from rest to rest", "several moves in both directions", act)

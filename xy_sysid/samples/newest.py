@@ -1,4 +1,4 @@
-"""The newest samples of a machine, paired and without gaps: what a live diagnosis looks at."""
+"""The newest samples of a machine, paired and without gaps, for a live diagnosis."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from xy_sysid.samples.block import Block, FloatArray, Samples
 from xy_sysid.samples.pairing import QUANTITIES, Gap, Pairer, Quantity
 from xy_sysid.samples.rate import StampLine
 
-FORGETS = ("restart", "unequal_rates")  # gaps after which what was heard before may be another machine
+FORGETS = ("restart", "unequal_rates")  # gaps after which earlier data may be from another machine
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class NewestSamples:
 
 
 class _Run:
-    """Consecutive samples, the newest ``most`` of them at least."""
+    """Consecutive samples, at least the newest ``most`` of them."""
 
     def __init__(self) -> None:
         self.parts: deque[Samples] = deque()
@@ -47,7 +47,7 @@ class Newest:
     """feed(kind, block), then ``newest``: the same blocks in any order of arrival give the same samples."""
 
     def __init__(self, axes: tuple[str, ...], memory: float, minimum: float, reorder: float) -> None:
-        """memory: s that are kept; minimum: s that a run must have before an earlier, longer one is given up for it."""
+        """memory: s that are kept; minimum: length in s of a run before it replaces an earlier, longer one."""
         self.axes = axes
         self.total = 0
         self._memory, self._minimum = memory, minimum
@@ -56,7 +56,7 @@ class Newest:
         self._now, self._before = _Run(), _Run()
 
     def feed(self, kind: Quantity, block: Block) -> None:
-        """Take one block of one stream."""
+        """Read one block of one stream."""
         for event in self._pairer.feed(kind, block):
             if isinstance(event, Gap):
                 if event.reason in FORGETS:
@@ -81,7 +81,7 @@ class Newest:
 
     @property
     def faults(self) -> dict[str, int]:
-        """What was wrong with the streams, counted by reason."""
+        """Number of faults in the streams, by reason."""
         return dict(self._pairer.counts)
 
     @property
@@ -91,11 +91,11 @@ class Newest:
 
     @property
     def seconds(self) -> float:
-        """Length of what ``newest`` would give."""
+        """Length of the samples that ``newest`` would return."""
         return self._best().size / self.sampling_rate if self.sampling_rate else 0.0
 
     def lacking(self) -> str:
-        """What is missing for a diagnosis, in words; empty if there is enough."""
+        """What is missing for a diagnosis, in words; empty if there are enough data."""
         silent = [kind for kind in QUANTITIES if self._pairer.waiting[kind] < 0]
         if silent:
             return f"no {' and no '.join(silent)} of axes {', '.join(self.axes)} received yet; start the machine and its excitation."
@@ -108,7 +108,7 @@ class Newest:
         return ""
 
     def newest(self) -> NewestSamples:
-        """The newest run, or the one before while it is short; ask ``lacking`` first."""
+        """The newest run, or the one before while it is short; check ``lacking`` first."""
         rate = self.sampling_rate or np.nan
         parts = self._best().parts
         most = round(self._memory * rate)

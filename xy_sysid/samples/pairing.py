@@ -1,7 +1,7 @@
-"""Pair voltage and position by sample counter, whatever order they come in, and say what was wrong with the streams.
+"""Pairs voltage and position by sample counter, in any order of arrival, and reports faults of the streams.
 
-Both streams are laid into rings that are indexed by the counter; where both rings are filled the samples go on, in
-order. What is missing for longer than the reorder time is given up as a gap.
+Both streams are stored in rings indexed by the counter. Samples that are in both rings are returned, in
+order. Samples that are missing for longer than the reorder time become a gap.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ QUANTITIES: tuple[Quantity, Quantity] = ("voltage", "position")
 
 LOOK_AGAIN = 5 * RATE_SAMPLES  # blocks of unequal rates after which both are estimated again
 RATE_TOLERANCE = 1e-3  # two streams, or one before and after a restart, have the same rate within this
-TIME_TOLERANCE = 1.5  # samples by which a time stamp may leave its place before that counts as a jump
-REORDER_UNKNOWN = 1000  # samples a block may be late as long as the rate is not known
-RESTART_BLOCKS = 2  # consecutive blocks from the past that together mean the source has started again
+TIME_TOLERANCE = 1.5  # samples by which a time stamp may deviate before that counts as a jump
+REORDER_UNKNOWN = 1000  # samples a block may be late while the rate is unknown
+RESTART_BLOCKS = 2  # consecutive old blocks that count as a restart of the source
 
 REASONS = {
     "lost": "samples never came",
@@ -42,7 +42,7 @@ REASONS = {
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Samples that will not come: from counter ``seq``, so many, and why (a key of REASONS)."""
+    """Missing samples: ``seq`` is the counter of the first; their number and the reason (a key of REASONS) follow."""
 
     seq: int
     samples: int
@@ -65,7 +65,7 @@ class Pairer:
 
     @property
     def rate(self) -> float | None:
-        """Sampling rate in Hz, once enough was heard of the position stream."""
+        """Sampling rate in Hz, from the position stream; None until enough samples have arrived."""
         return self._rings["position"].rate
 
     @property
@@ -76,11 +76,11 @@ class Pairer:
 
     @property
     def waiting(self) -> dict[Quantity, int]:
-        """Newest counter heard of each stream, -1 before the first."""
+        """Newest counter of each stream, -1 before the first sample."""
         return {kind: ring.newest for kind, ring in self._rings.items()}
 
     def feed(self, kind: Quantity, block: Block) -> list[Samples | Gap]:
-        """Take one block of one stream; blocks may have any length."""
+        """Read one block of one stream; blocks may have any length."""
         step = self._rings[kind].capacity // 4
         if len(block) <= step:
             return self._feed(kind, block)
@@ -125,7 +125,7 @@ class Pairer:
         return found + self._go_on(kind, ring)
 
     def _go_on(self, kind: Quantity, ring: Ring) -> list[Samples | Gap]:
-        """What can be paired now that samples were laid in; nothing of a stream that has come to another rate."""
+        """Return what can be paired after new samples; nothing for a stream whose rate has changed."""
         if ring.left_its_rate():
             self._fault(
                 "restart", f"{kind}: from about counter {ring.newest} on the time does not follow {ring.rate:.6g} Hz; the rate is estimated again"
@@ -134,7 +134,7 @@ class Pairer:
         return [] if self._rates_differ() else self._emit()
 
     def _anew(self, counter: int) -> Gap:
-        """Forget both streams, their rates too."""
+        """Reset both streams, including their rates."""
         for ring in self._rings.values():
             ring.clear()
         self._next, self._cuts, self._bad = None, {}, {}
@@ -152,7 +152,7 @@ class Pairer:
         self.said[reason] = text
 
     def _restarted(self, ring: Ring, seq: NDArray[np.int64]) -> bool:
-        """A jump far back that goes on consistently is a restart; a single old block is only late."""
+        """A jump far back that continues consistently is a restart; a single old block is only late."""
         if ring.newest < 0 or int(seq[0]) > ring.newest - self._reorder:
             ring.behind = 0
             return False
@@ -169,7 +169,7 @@ class Pairer:
         return good
 
     def _check_time(self, kind: Quantity, ring: Ring, seq: NDArray[np.int64], time: FloatArray) -> NDArray[np.bool_]:
-        """Time must follow the counter; where it leaves it for good, a run is cut, where it is nonsense, samples are refused."""
+        """Compare time with the counter: a lasting deviation cuts a run, invalid times are refused."""
         good = np.asarray(np.isfinite(time), dtype=np.bool_)
         if ring.rate is not None and bool(good.any()):
             offset = time - seq / ring.rate
@@ -194,12 +194,12 @@ class Pairer:
         if rates[0] is None or rates[1] is None or abs(rates[0] / rates[1] - 1.0) <= RATE_TOLERANCE:
             return False
         self._fault("unequal_rates", f"voltage comes at {rates[0]:.6g} Hz, position at {rates[1]:.6g} Hz; they must be equal")
-        if self.counts["unequal_rates"] % LOOK_AGAIN == 0:  # one of them may have been read while its source caught up with a stall
+        if self.counts["unequal_rates"] % LOOK_AGAIN == 0:  # one rate may have been estimated while its source caught up after a delay
             self._anew(-1)
         return True
 
     def _make_room(self, newest: int) -> list[Samples | Gap]:
-        """Give up what would be overwritten when one stream runs far ahead of the other."""
+        """Give up samples that would be overwritten if one stream is far ahead of the other."""
         capacity = self._rings["voltage"].capacity
         if self._next is None or newest - self._next < capacity:
             return []
@@ -235,7 +235,7 @@ class Pairer:
         return found
 
     def _all_known_bad(self, length: int) -> bool:
-        """Whether the hole ahead is known never to be filled, so that there is nothing to wait for."""
+        """True if the missing samples are known to be invalid, so that waiting is useless."""
         start = self._next or 0
         return length > 0 and all(start + i in self._bad for i in range(length))
 

@@ -1,7 +1,7 @@
 """The sampling rate from all stamps so far: a straight line through them by least squares, with its standard error.
 
-Stamps jitter, and neighbours jitter alike (one late cycle makes the next ones late), so the line goes through means of BATCH
-samples, whose scatter tells the error. The same samples give the same figure to the last bit, in whatever pieces they come.
+Stamps jitter, and neighbours are correlated (one late cycle delays the next ones). Therefore the line is fitted to means of BATCH
+samples, and their scatter gives the error. The same samples give the same result bit for bit, in any chunking.
 Source: Draper & Smith, Applied Regression Analysis, 3rd ed., ch. 1; batch means: Law, Simulation Modeling and Analysis, 9.5.3.
 """
 
@@ -18,13 +18,13 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import rate_from_time, whole_rate
 
 BATCH = 50  # samples of one mean
-JUMP = 1.5  # periods by which a stamp may leave the one before it, as live
-FEWEST = 4  # means from which an error and a first period can be estimated
-LEAP, STEP, ASIDE = 0.5, 0.75, 10  # a number slipped where one sample leaps by LEAP periods, and the means of ASIDE before and after by STEP
+JUMP = 1.5  # periods by which a stamp may deviate from the previous one, as in the live nodes
+FEWEST = 4  # means needed to estimate an error and a first period
+LEAP, STEP, ASIDE = 0.5, 0.75, 10  # a counter slip: one sample jumps by LEAP periods, and the means of ASIDE samples before and after differ by STEP
 
 
 class StampLine:
-    """add(first, stamps), cut() where the stamps leave their line, until(counter), then ``rate`` and ``error``."""
+    """Call add(first, stamps), cut() where the stamps leave their line, until(counter), then read ``rate`` and ``error``."""
 
     def __init__(self) -> None:
         self._known: tuple[float, float] | None = None  # rate and relative error of earlier stretches
@@ -33,9 +33,9 @@ class StampLine:
     def _begin(self) -> None:
         self._seq: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self._time: FloatArray = np.zeros(0)
-        self._origin: tuple[int, float, float] | None = None  # counter, stamp, and period that residuals are taken against
+        self._origin: tuple[int, float, float] | None = None  # counter, stamp and period for residuals
         self._sums = np.zeros(6)
-        self._waiting: tuple[float, FloatArray] | None = None  # the newest batch, which counts once it is known that nothing slipped at its end
+        self._waiting: tuple[float, FloatArray] | None = None  # the newest batch, which counts after a check for a slip at its end
 
     def add(self, first: int, stamps: FloatArray) -> None:
         """Stamps, s, of consecutive samples from counter ``first`` on."""
@@ -43,7 +43,7 @@ class StampLine:
         self._time = np.concatenate((self._time, stamps))
 
     def until(self, counter: int) -> None:
-        """Take in whole batches of the samples before this counter."""
+        """Use complete batches of the samples before this counter."""
         whole = int(np.searchsorted(self._seq, counter)) // BATCH * BATCH
         if whole == 0 or (self._origin is None and whole < FEWEST * BATCH):
             return
@@ -61,14 +61,14 @@ class StampLine:
         self._take(place.reshape(-1, BATCH).mean(axis=1), off.reshape(-1, BATCH) / period)
 
     def _take(self, x: FloatArray, rows: FloatArray) -> None:
-        """Batches (n,), (n, BATCH), in periods off; if a number slipped in one or at the end of that before, neither counts, and a new stretch
-        begins."""
+        """Add batches (n,), (n, BATCH), in periods off the line. After a slip in one, or at the end of the previous one, neither counts and a new
+        stretch starts."""
         if self._waiting is not None:
             x, rows = np.concatenate(([self._waiting[0]], x)), np.concatenate((self._waiting[1][None], rows))
         slipped, means, waiting = _slips(rows), rows.mean(axis=1).tolist(), True
         for k, bad in enumerate(slipped.tolist()):
             if not waiting:
-                waiting = True  # the batch before this pair belongs to none
+                waiting = True  # the previous batch does not belong to a pair
             elif bad:
                 self._known, self._sums, waiting = self._both(), np.zeros(6), False
             else:
@@ -76,29 +76,29 @@ class StampLine:
         self._waiting = (float(x[-1]), rows[-1]) if waiting else None
 
     def cut(self) -> None:
-        """What follows lies on another line of the same rate: what is known of the rate is kept."""
+        """The following stamps are on another line of the same rate: keep the estimate of the rate."""
         found = self._both()
         self._begin()
         self._known = found
 
     def start(self, rate: float, error: float) -> None:
-        """Go on from what was known before a restart."""
+        """Continue from the estimate before a restart."""
         self._known = (rate, error)
 
     @property
     def rate(self) -> float | None:
-        """Hz, None as long as it is not known; one within 20 ppm of a whole number is that number."""
+        """Hz, None while unknown; a rate within 20 ppm of an integer is that integer."""
         found = self._both()
         return None if found is None else whole_rate(found[0])
 
     @property
     def error(self) -> float:
-        """Standard error of the rate, relative; 0 as long as it is not known."""
+        """Standard error of the rate, relative; 0 while unknown."""
         found = self._both()
         return 0.0 if found is None else found[1]
 
     def _both(self) -> tuple[float, float] | None:
-        """Of this stretch and those before, weighted by their errors."""
+        """(rate, error) of this stretch and the earlier ones, weighted by their errors."""
         now, before = self._now(), self._known
         if now is None or before is None:
             return now or before
@@ -133,7 +133,7 @@ def error_of_rate(time: FloatArray, seq: NDArray[np.int64]) -> float:
 
 
 def _slips(rows: FloatArray) -> NDArray[np.bool_]:
-    """(n - 1,) whether a number slipped in a batch, or at the end of that before it; rows: (n, BATCH) periods off."""
+    """(n - 1,) True if the counter slipped in a batch, or at the end of the previous one; rows: (n, BATCH) periods off."""
     both = np.concatenate((rows[:-1], rows[1:]), axis=1)
     at = np.arange(BATCH - ASIDE + 1, 2 * BATCH - ASIDE + 1)
     sums = np.concatenate((np.zeros((len(both), 1)), np.cumsum(both, axis=1)), axis=1)
@@ -144,7 +144,7 @@ def _slips(rows: FloatArray) -> NDArray[np.bool_]:
 
 @compiled
 def _grow(sums: FloatArray, x: float, y: float) -> None:
-    """Number, means and centred sums of (x, y) with one pair more (Welford, Technometrics 4, 1962)."""
+    """Update number, means and centred sums of (x, y) with one more pair (Welford, Technometrics 4, 1962)."""
     sums[0] += 1.0
     dx, dy = x - sums[1], y - sums[2]
     sums[1] += dx / sums[0]

@@ -15,10 +15,10 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import OF, SCALES, Sensed, Units
 
-STANDS = 0.02  # part of the longest way of a second: an axis that goes less far, and is not driven, stands
-COMPARABLE = 0.5  # of the longest stretch; shorter ones hold too few of its windows
-MOST_STRETCHES = 24  # that are worked on together
-SLOWEST = 3.0  # Hz; slower samples show no machine's axis, but a wrong unit of time
+STANDS = 0.02  # of the longest distance within a second: an axis with less motion and no drive counts as at rest
+COMPARABLE = 0.5  # of the longest stretch; shorter ones contain too few of its windows
+MOST_STRETCHES = 24  # stretches that are analysed together, at most
+SLOWEST = 3.0  # Hz; a lower rate is not a machine axis but a wrong time unit
 SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong together
 
 
@@ -38,8 +38,8 @@ class Run:
     sampling_rate: Hz
     voltage:       (n,) input in ``input_unit``, held from its instant to the next
     position:      (n,) output in ``output_unit`` at its instant
-    first:         row of the first sample in the recording
-    measured:      what the sensor reads; ``position`` is the integral of a velocity or an acceleration
+    first:         index of the first sample in the recording
+    measured:      quantity of the sensor; ``position`` is the integral of a velocity or an acceleration
     """
 
     axis: str
@@ -65,17 +65,17 @@ class Run:
         return slice(self.first, self.first + len(self))
 
     def until(self, seconds: float) -> Run:
-        """The samples before that time; all of them if the run is shorter."""
+        """The samples before that time; all if the run is shorter."""
         last = round(seconds * self.sampling_rate)
         return replace(self, voltage=self.voltage[:last], position=self.position[:last])
 
     def after(self, sample: int) -> Run:
-        """The samples from this one on."""
+        """The samples from this index on."""
         return replace(self, voltage=self.voltage[sample:], position=self.position[sample:], first=self.first + sample)
 
     @property
     def units(self) -> Units:
-        """Of input and output."""
+        """Units of input and output."""
         return OF[self.measured](self.input_unit, self.output_unit)
 
     @property
@@ -84,7 +84,7 @@ class Run:
         return hashlib.sha256(self.voltage.tobytes() + self.position.tobytes()).hexdigest()
 
     def recording(self) -> Recording:
-        """The same as a recording of one axis."""
+        """The run as a recording of one axis."""
         seq = np.arange(self.first, self.first + len(self), dtype=np.int64)
         return Recording(
             sampling_rate=self.sampling_rate,
@@ -146,11 +146,11 @@ class Recording:
 
     @property
     def units(self) -> Units:
-        """Of input and output."""
+        """Units of input and output."""
         return OF[self.measured](self.input_unit, self.output_unit)
 
     def of_axes(self, axes: Sequence[str]) -> Recording:
-        """The same of some of its axes, in this order."""
+        """The recording with only these axes, in this order."""
         places = [self.axes.index(axis) for axis in axes]
         reference = None if self.reference is None else self.reference[:, places]
         return replace(self, axes=tuple(axes), voltage=self.voltage[:, places], position=self.position[:, places], reference=reference)
@@ -208,7 +208,7 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Length of the data itself, without its gaps, s."""
+        """Length of the data without gaps, s."""
         return len(self) / self.sampling_rate
 
     def runs(self) -> list[slice]:
@@ -218,7 +218,7 @@ class Recording:
         return [slice(a, b) for a, b in itertools.pairwise(bounds) if b > a]
 
     def only(self, rows: slice | NDArray[np.bool_]) -> Recording:
-        """Some of its samples; those between become a gap."""
+        """Some of the samples; omitted ones between them become a gap."""
         return replace(
             self,
             seq=self.seq[rows],
@@ -229,7 +229,7 @@ class Recording:
         )
 
     def axis(self, name: str) -> tuple[FloatArray, FloatArray]:
-        """Input and output of one axis, (n,) each; raises BadInput for a name that is not there."""
+        """Input and output of one axis, (n,) each; raises BadInput for an unknown name."""
         if name not in self.axes:
             raise BadInput("axis", repr(name), ", ".join(self.axes), "Choose one of these.")
         column = self.axes.index(name)
@@ -255,7 +255,7 @@ class Recording:
         return tuple(sorted(longest, key=lambda run: run.first))
 
     def left_out(self, axes: Sequence[str]) -> tuple[str, ...]:
-        """What is in none of the ``stretches`` of these axes, a sentence for each of which something is left out."""
+        """Data that are in none of the ``stretches`` of these axes, one sentence per axis with omitted data."""
         found = ((axis, self._left_out(axis)) for axis in axes if len(self))
         return tuple(f"axis {axis}: left out {said}" for axis, said in found if said)
 
@@ -305,7 +305,7 @@ def _size(rows: slice) -> int:
 
 
 def _driven(voltage: FloatArray, position: FloatArray, second: int) -> slice:
-    """The samples (n,) without idle ends, where the input is constant and the output at rest; one second of each end is kept."""
+    """The samples (n,) without idle ends, where the input is constant and the output at rest; one second is kept at each end."""
     begins = np.arange(0, max(voltage.size - second, 0) + 1, second)
     ways, inputs = (np.array([np.ptp(signal[at : at + second]) for at in begins]) for signal in (position, voltage))
     lively = np.flatnonzero((inputs > 0.0) | (ways > STANDS * ways.max(initial=0.0)))
@@ -326,7 +326,7 @@ def _rate(value: Any) -> float:
 
 
 def _columns(voltage: Any, position: Any, axes: Sequence[str]) -> tuple[FloatArray, FloatArray, Sequence[str]]:
-    """(n, axes) of both, and the names of the axes if they are given."""
+    """(n, axes) of both, and the names of the axes if given."""
     if isinstance(voltage, Mapping) != isinstance(position, Mapping):
         raise BadInput("voltage and position", "one by axis and one not", "both by axis, or both arrays", "Give both alike.")
     both = {"voltage": voltage, "position": position}
@@ -366,7 +366,7 @@ def _numbers(name: str, values: Any) -> FloatArray:
 
 
 def one_run(data: Run | Recording) -> Run:
-    """A run, or the longest of a recording that has one axis only; raises BadInput for a recording of several."""
+    """A run, or the longest run of a recording with a single axis; raises BadInput for a recording with several."""
     if isinstance(data, Run):
         return data
     if not isinstance(data, Recording):
@@ -391,9 +391,9 @@ def rate_from_time(time: FloatArray, seq: NDArray[np.int64] | None = None) -> fl
     period = float(np.median(steps / counts))
     if period <= 0:
         raise BadInput("median time step", f"{period:.3g} s", "> 0 s", "Sort the rows by time and drop repeated ones.")
-    regular = np.abs(steps - counts * period) < (0.5 if seq is None else 1.5) * period  # without a counter a lost sample is one step too long
+    regular = np.abs(steps - counts * period) < (0.5 if seq is None else 1.5) * period  # without a counter a lost sample makes one step too long
     number, instant = (np.concatenate(([0.0], np.cumsum(values[regular]))) for values in (counts, steps))
-    if seq is None:  # a period that wanders has a mean and no line
+    if seq is None:  # a varying period has a mean but no line
         return whole_rate(float(number[-1] / instant[-1]) if instant[-1] > 0 else 1.0 / period)
     number -= number.mean()
     slope = float(number @ instant) / float(number @ number) if number.size > 1 else period
@@ -401,6 +401,6 @@ def rate_from_time(time: FloatArray, seq: NDArray[np.int64] | None = None) -> fl
 
 
 def whole_rate(rate: float) -> float:
-    """A rate within 20 ppm of a whole number of Hz is that number."""
+    """The rate, rounded to an integer number of Hz if it is within 20 ppm of it."""
     whole = float(round(rate))
     return whole if whole > 0 and abs(rate / whole - 1.0) < 20e-6 else rate

@@ -1,7 +1,7 @@
-"""Assign the reference of a controller to paired samples, by its stamps.
+"""Assigns the controller's reference to paired samples by its time stamps.
 
-Each sample gets the newest reference that was sent up to its instant. The reference is an instrument: what a constant lead, or a sample
-that got its neighbour's reference, does to it is the same for input and output, and cancels in their quotient
+Each sample gets the newest reference that was sent up to its instant. The reference is an instrument: a constant lead, or a sample with
+its neighbour's reference, has the same effect on input and output, and cancels in their quotient
 (Söderström & Stoica, Instrumental variable methods, 1983, sec. 3.1).
 """
 
@@ -20,14 +20,14 @@ NO_REFERENCE = "no_reference"
 
 
 class ReferenceHold:
-    """``hear`` blocks of the reference, ``take`` paired samples and gaps; both give what is decided by then, in order.
+    """``hear`` reads blocks of the reference, ``take`` reads paired samples and gaps; both return the samples that are complete, in order.
 
-    A sample is decided when a reference of its instant or later has come; one that is older than the newest samples by more than a
-    reference may be late, or whose newest reference is older than that, becomes a gap.
+    A sample is complete when a reference of its instant or later has arrived. It becomes a gap if it is older than the newest samples by more than
+    the allowed delay of a reference, or if its newest reference is older than that.
     """
 
     def __init__(self, axes: tuple[str, ...], late: float) -> None:
-        """axes: of the samples; late: s by which a reference may come late, and for which it stays in force."""
+        """axes: of the samples; late: maximum delay of a reference in s, and the time for which it stays valid."""
         self.counts: Counter[str] = Counter()
         self.said: dict[str, str] = {}
         self.newest = -1
@@ -38,7 +38,7 @@ class ReferenceHold:
         self._latest = -np.inf
 
     def hear(self, block: Block) -> list[Samples | Gap]:
-        """Take a block of the reference, in blocks of any length."""
+        """Read a block of the reference; blocks may have any length."""
         if any(axis not in block.axes for axis in self._axes) or block.values.shape != (len(block), len(block.axes)):
             self._fault("wrong_columns", f"reference: columns {', '.join(block.axes)}; expected {', '.join(self._axes)}")
             return []
@@ -58,10 +58,10 @@ class ReferenceHold:
         return self._decided()
 
     def take(self, event: Samples | Gap) -> list[Samples | Gap]:
-        """Take what the pairing gave; samples need their stamps."""
+        """Read the output of the pairing; samples need their stamps."""
         self._waiting.append(event)
         if isinstance(event, Samples) and event.time is not None and len(event):
-            self._latest = float(event.time[0])  # of its first sample, so that a block as long as that has time for its reference
+            self._latest = float(event.time[0])  # of its first sample, so that a long block also waits for its reference
         return self._decided()
 
     def _decided(self) -> list[Samples | Gap]:
@@ -85,7 +85,7 @@ class ReferenceHold:
         return found
 
     def _laid(self, samples: Samples, time: FloatArray) -> list[Samples | Gap]:
-        """Runs with a reference, and gaps between them."""
+        """Runs with a reference, and the gaps between them."""
         place = np.searchsorted(self._time, time, side="right") - 1
         there: NDArray[np.bool_] = place >= 0
         there[there] = time[there] - self._time[place[there]] <= self._late
@@ -100,7 +100,7 @@ class ReferenceHold:
         return found
 
     def _forget(self) -> None:
-        """References that no sample can want any more."""
+        """Drop references that no sample needs any more."""
         first = self._waiting[0] if self._waiting else None
         oldest = float(first.time[0]) if isinstance(first, Samples) and first.time is not None else self._latest
         keep = max(int(np.searchsorted(self._time, oldest - self._late)), 0)

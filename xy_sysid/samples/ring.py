@@ -1,7 +1,7 @@
-"""One stream of samples, kept by its counter modulo a capacity, so that blocks may come in any order.
+"""One stream of samples, stored by its counter modulo a capacity, so that blocks may arrive in any order.
 
-A block that goes on where the last one ended, with nothing wrong about it, is laid in by one compiled loop: at 2 kHz in
-blocks of 20 that is every block, a hundred times a second.
+A block without a fault that continues the previous one is stored by one compiled loop: at 2 kHz in
+blocks of 20 that is the usual case, a hundred times a second.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from xy_sysid.jit import compiled
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.samples.recording import rate_from_time
 
-RATE_SAMPLES = 200  # samples of one stream from which its rate is read
-DRIFT = 0.01  # of a period a sample, over DRIFT_SECONDS: then the rate is another one
-DRIFT_SECONDS, DRIFT_SAMPLES = 5.0, 10 * RATE_SAMPLES  # of which so many samples are enough; half as many show twice the drift
+RATE_SAMPLES = 200  # samples of one stream for the estimate of its rate
+DRIFT = 0.01  # of a period per sample, over DRIFT_SECONDS: above this the rate has changed
+DRIFT_SECONDS, DRIFT_SAMPLES = 5.0, 10 * RATE_SAMPLES  # this many samples are enough; half as many show twice the drift
 
 Counters = NDArray[np.int64]
 
@@ -24,11 +24,11 @@ Counters = NDArray[np.int64]
 class Ring:
     """The newest ``capacity`` samples of one stream.
 
-    tag: (capacity,) the counter of the sample that lies there, -1 for none; value: (capacity, axes); time: (capacity,) stamps, s
-    newest: the highest counter heard, -1 before the first; rate: Hz, None until it is learnt
+    tag: (capacity,) the counter of the stored sample, -1 for none; value: (capacity, axes); time: (capacity,) stamps, s
+    newest: the highest counter, -1 before the first; rate: Hz, None until it is estimated
     offset: s, time of the newest sample less its counter over the rate
-    behind, behind_next: how many blocks in a row came from the past, and the counter with which the next would go on
-    jumping: samples without a break whose time left their counter
+    behind, behind_next: number of consecutive old blocks, and the counter with which the next would continue
+    jumping: number of consecutive samples whose time does not match their counter
     """
 
     def __init__(self, capacity: int, axes: int) -> None:
@@ -42,12 +42,12 @@ class Ring:
         self.behind = 0
         self.behind_next = -1
         self.jumping = 0
-        self._anchor: tuple[int, float] | None = None  # counter and offset from which on the time has to follow the rate
+        self._anchor: tuple[int, float] | None = None  # counter and offset from which the time must follow the rate
         self._seqs: list[FloatArray] = []
         self._times: list[FloatArray] = []
 
     def follow(self, block: Block, least: int, tolerance: float) -> bool:
-        """Lay in a block that begins right after the newest sample and has no fault; False, and nothing done, for any other.
+        """Store a block that starts right after the newest sample and has no fault; for any other block return False without a change.
 
         least: counter from which on samples are still wanted; tolerance: samples by which a time may leave its place
         """
@@ -64,11 +64,11 @@ class Ring:
         return True
 
     def jumped(self) -> None:
-        """What follows lies on another line of the same rate."""
+        """The following samples are on another line of the same rate."""
         self._anchor = None
 
     def left_its_rate(self) -> bool:
-        """Whether the time has drifted off the learnt rate, though no stamp left the one before it by much."""
+        """True if the time has drifted from the learned rate, although no stamp jumped."""
         if self.rate is None or self.offset is None:
             return False
         if self._anchor is None:
@@ -84,7 +84,7 @@ class Ring:
         return False
 
     def put(self, seq: Counters, values: FloatArray, time: FloatArray) -> int:
-        """Store what is new; the number of samples that were there already."""
+        """Store new samples; returns the number of samples that were already there."""
         place = seq % self.capacity
         fresh = self.tag[place] != seq
         if bool(fresh.all()):
@@ -96,12 +96,12 @@ class Ring:
         return int(seq.size - np.count_nonzero(fresh))
 
     def filled(self, first: int, last: int) -> NDArray[np.bool_]:
-        """(last - first,) whether each counter is there."""
+        """(last - first,) True for each stored counter."""
         seq = np.arange(first, last)
         return np.asarray(self.tag[seq % self.capacity] == seq, dtype=np.bool_)
 
     def take(self, first: int, last: int) -> FloatArray:
-        """(last - first, axes) a copy of what lies there."""
+        """(last - first, axes) a copy of the stored values."""
         return self._copy(self.value, first, last)
 
     def stamps(self, first: int, last: int) -> FloatArray:
@@ -116,13 +116,13 @@ class Ring:
         return np.concatenate((store[begin:], store[: end - self.capacity]))
 
     def clear(self) -> None:
-        """Forget everything, the rate too: a source that comes back may be another one."""
+        """Delete everything including the rate: a source that restarts may be another one."""
         self.tag.fill(-1)
         self.newest, self.offset, self.behind, self.jumping, self._anchor = -1, None, 0, 0, None
         self.rate, self._seqs, self._times = None, [], []
 
     def learn_rate(self, block: Block) -> None:
-        """Read the rate from the first samples."""
+        """Estimate the rate from the first samples."""
         if self.rate is None:
             self._seqs.append(block.seq.copy())
             self._times.append(block.time.copy())

@@ -1,4 +1,4 @@
-"""A job on one axis' story, step by step: the node, the replay and the page do the same."""
+"""A job on one axis's story, step by step; shared by the node, the replay and the page."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ANEW: tuple[Act, ...] = ("diagnose", "renew")  # acts that start a new story
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What is to be done with one axis.
+    """A job for one axis.
 
     act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins again with these samples and then has ``effects`` in
     the model, ``renew`` does so without asking what is missing, ``effects`` changes the effects and keeps the samples, ``add_next`` adds the
@@ -37,7 +37,7 @@ class Job:
 
 
 def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> Iterator[tuple[str, Story | None]]:
-    """(what is being done now, None), and (what was done, the story so far) after each step. Raises BadInput for a wrong effect."""
+    """(current activity, None), and (finished activity, story so far) after each step. Raises BadInput for a wrong effect."""
     run = (job.run, *job.more)
     story = None if job.act in ANEW else job.story
     if story is None:
@@ -73,13 +73,13 @@ def perform(job: Job, library: Library, clock: Callable[[], float] = never) -> I
 
 
 def unheard(axis: str, sampling_rate: float, seconds: float, lacking: str, tolerance: float, units: Units) -> Story:
-    """The story of an axis of which too little was heard to begin."""
+    """The story of an axis with too few data for a start."""
     told = not_enough(lacking, units)
     return Story(axis=axis, sampling_rate=sampling_rate, seconds=seconds, tolerance=tolerance, units=units, diagnosis=told)
 
 
 def sentence(story: Story) -> str:
-    """What is known of the axis, in words."""
+    """The state of the axis's story in words."""
     told = story.diagnosis.sentence if story.diagnosis is not None else "Not diagnosed yet."
     now = story.now
     if story.diagnosis is not None and story.diagnosis.verdict == "nothing_missing" and not story.effects:

@@ -1,4 +1,4 @@
-"""A calculation that may fail: whatever goes wrong in it becomes a sentence that says what to do, and the process goes on."""
+"""A calculation that may fail: any error in it becomes a sentence with the next action, and the process continues."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from types import TracebackType
 
 from xy_sysid.errors import XySysidError
 
-LONGEST = 200  # characters of an error that are kept
+LONGEST = 200  # characters of an error message that are kept
 UNFORESEEN = (
     "This step could not be calculated, and the model stays as it was. Try another effect or another part of the recording. "
     "If it happens again, please report it with the recording and the log."
@@ -17,9 +17,9 @@ NO_MEMORY = "There is not enough memory for this step, and the model stays as it
 
 
 class Attempt:
-    """``with attempt: ...``. problem: the sentence, empty if all went well; detail: kind, text and place of an unforeseen error, for a log.
+    """``with attempt: ...``. problem: the sentence, empty on success; detail: type, text and place of an unforeseen error, for a log.
 
-    Errors of a broken pipe or file pass: they end whoever talks through it.
+    Errors of a broken pipe or file are raised: they end the process that uses it.
     """
 
     def __init__(self, unforeseen: str = UNFORESEEN) -> None:

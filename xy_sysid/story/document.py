@@ -1,6 +1,6 @@
-"""A story as a JSON document: what ``diagnose --json`` says of an axis, the ladder, the model, and every step's pictures.
+"""A story as a JSON document: the result of ``diagnose --json`` for an axis, the error ladder, the model, and every step's figure data.
 
-docs/story.md describes it; the page, the report and the topic ``story/<axis>`` are drawn from it and from nothing else.
+docs/story.md describes it; the page, the report and the topic ``story/<axis>`` are drawn from this document only.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from xy_sysid.story.story import Story
 
 FORMAT = "xy_sysid story 1"
 DIGITS = 5
-DRAWN = 8  # newest steps that keep their pictures in the document, besides the base
+DRAWN = 8  # newest steps whose figure data stay in the document, in addition to the rigid model
 UNKNOWN: dict[str, Any] = {
     "verdict": None, "effect": None, "effects": [], "confidence": None, "sentence": "Not diagnosed yet.",
     "where": [], "candidates": [], "runner_up": None, "look_alikes": [], "next_experiment": "",
@@ -28,7 +28,7 @@ UNKNOWN: dict[str, Any] = {
 
 
 def document(story: Story) -> dict[str, Any]:
-    """The whole story of one axis in JSON's own types."""
+    """The story of one axis in JSON types."""
     base, now, drawn = story.rungs[0] if story.rungs else None, story.now, len(story.rungs) - DRAWN
     told = UNKNOWN if story.diagnosis is None else answer_document(story.diagnosis)
     ladder = [rung_document(rung) for rung in story.rungs]
@@ -152,7 +152,7 @@ def _row(values: FloatArray | Iterable[float], digits: int = DIGITS) -> list[flo
 
 
 def _plain(value: Any) -> Any:
-    """Not finite becomes null; numpy's numbers become Python's."""
+    """Convert to JSON types: non-finite numbers become null."""
     if isinstance(value, dict):
         return {name: _plain(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,7 +1,7 @@
-"""The pictures of one fit as short rows of numbers: frequency response, where the error is, and the signals in time.
+"""The figure data of one fit as short rows of numbers: frequency response, places of the error, and the signals in time.
 
-What is measured is kept once (``Measured``); each fit adds its own side (``Pictures``). The model's response comes from its
-simulated motion through the same windows as the measured one, so that friction and the like show as they do in the data.
+Measured data are stored once (``Measured``); each fit adds its own part (``Pictures``). The model's response comes from its
+simulated motion through the same windows as the measured one, so that friction affects both in the same way.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ COHERENT = 0.3  # least coherence of a trusted point
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What is measured, for all fits.
+    """The measured data, shared by all fits.
 
     frequency: (m,) Hz, log-spaced; magnitude, magnitude_low, magnitude_high: dB (m/V) with 95 % band; phase...: degrees
     coherence: (m,); trusted: (m,) bool: excited and coherent
-    time: (k,) s, middle of each bucket, gaps left out; velocity_low, velocity_high: (k,) m/s, least and most in it; position: (k,) m, mean
+    time: (k,) s, middle of each bin, without gaps; velocity_low, velocity_high: (k,) m/s, minimum and maximum; position: (k,) m, mean
     zoom_start: s; zoom_voltage, zoom_velocity: samples around the base's largest error
-    held_out: (from, to), s, of each stretch that no fit has seen, except fits that are judged one sample ahead; those see none from ahead on
+    held_out: (from, to), s, of each stretch of held-out data. A fit with one-step prediction holds out only the data from ``ahead`` on
     """
 
     frequency: FloatArray
@@ -68,7 +68,7 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class Binned:
-    """The error in bins of something: centre of each bin, rms error over the noise floor, and mean error, m/s."""
+    """The error in bins of a variable: centre of each bin, rms error divided by the noise floor, and mean error, m/s."""
 
     centre: FloatArray
     over_floor: FloatArray
@@ -77,13 +77,13 @@ class Binned:
 
 @dataclass(frozen=True, slots=True)
 class Pictures:
-    """What one fit says of the same.
+    """The figure data of one fit.
 
     magnitude, phase: (m,) dB, degrees, at ``Measured.frequency``; linear: its linear part
     band, band_error: (b,) Hz, rms error over the noise floor on unseen data; band_end: Hz where signal meets floor
     failing: places where it fails, worst first
     speed, place, time: error by velocity (with its sign), by position, and by time
-    correlation: of the error with itself and with the voltage; None where there are too few samples
+    correlation: of the error with itself and with the voltage; None with too few samples
     velocity_low, velocity_high, position: as of ``Measured``, simulated; zoom_velocity: the same samples
     """
 
@@ -105,7 +105,7 @@ class Pictures:
 
 
 def measured(data: AxisData, base: GreyboxFit) -> Measured:
-    """The measured side; the zoom lies where the base's error is largest."""
+    """The measured data; the zoom is at the largest error of the rigid model."""
     response, weight, point = _points(data)
     whole, sigma = _mean_response(response, weight, point), _sigma(response, weight, point)
     size = np.abs(whole)
@@ -139,7 +139,7 @@ def measured(data: AxisData, base: GreyboxFit) -> Measured:
 
 
 def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
-    """The side of one fit. The error over the floor in bins has the ratio of the whole, held-out error over floor, in its mean power."""
+    """The figure data of one fit. The bins are scaled so that their mean power matches held-out error divided by floor."""
     travelled = (np.concatenate(([0.0], np.cumsum(fitted.simulated[step]))) / data.sampling_rate for step in data.steps)
     position = np.concatenate([data.position[run.start] + way for run, way in zip(data.runs, travelled, strict=True)])
     _, weight, point = _points(data)
@@ -150,7 +150,7 @@ def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
     unseen = np.arange(error.size) >= data.training if fitted.one_step else data.held_samples()
     noise = max(_rms(error[unseen]) * compared.noise_floor / max(compared.error, 1e-300), 1e-300)
     time = np.asarray((np.arange(error.size) + 0.5) / data.sampling_rate, dtype=np.float64)
-    known = np.isfinite(compared.error_over_floor)  # narrow bands may hold no line
+    known = np.isfinite(compared.error_over_floor)  # narrow bands may contain no line
     low, most = _extremes(fitted.simulated)
     first = round(shown.zoom_start * data.sampling_rate)
     return Pictures(
@@ -173,7 +173,7 @@ def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
 
 
 def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
-    """On the samples that no fit saw; by bands alone if those are few.
+    """The comparison on held-out samples; by bands alone if there are few.
 
     A model that is judged one sample ahead fails where it is above what counts as explained there.
     """
@@ -213,7 +213,7 @@ def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
 
 
 def _stretches(data: AxisData) -> tuple[tuple[float, float], ...]:
-    """(from, to), s, of each stretch of samples that no fit has seen."""
+    """(from, to), s, of each stretch of held-out samples."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], data.held_samples().astype(np.int8), [0])))) / data.sampling_rate
     return tuple((float(first), float(last)) for first, last in zip(edges[::2], edges[1::2], strict=True))
 
@@ -240,7 +240,7 @@ def _response(data: AxisData, position: FloatArray) -> FrequencyResponse:
     longest = max(run.stop - run.start for run in data.runs)
     length = 2 ** int(np.log2(max(min(WINDOW * data.sampling_rate, longest / 4.0), 16.0)))
     shape = WindowShape.of("hann", length, 0.5)
-    firsts = np.cumsum([0, *(-(-(run.stop - run.start) // shape.hop) * shape.hop for run in data.runs)])  # each begins with a window
+    firsts = np.cumsum([0, *(-(-(run.stop - run.start) // shape.hop) * shape.hop for run in data.runs)])  # each starts with a window
     runs = [(int(first), data.voltage[run], position[run]) for first, run in zip(firsts, data.runs, strict=False)]
     spectra = batch_spectra(runs, shape, differenced=True)
     return frequency_response(
@@ -249,7 +249,7 @@ def _response(data: AxisData, position: FloatArray) -> FrequencyResponse:
 
 
 def _points(data: AxisData) -> tuple[FrequencyResponse, FloatArray, NDArray[np.int64]]:
-    """The measured response, the weight of each line, and the point of the picture that it goes into."""
+    """The measured response, the weight of each line, and the index of its figure point."""
     response = _response(data, data.position)
     f = response.frequency
     edges = np.geomspace(f[0], f[-1] * 1.000001, POINTS + 1)
@@ -257,7 +257,7 @@ def _points(data: AxisData) -> tuple[FrequencyResponse, FloatArray, NDArray[np.i
     certain = np.isfinite(response.sigma) & (response.sigma > 0.0)
     weight = np.where(certain, 1.0 / np.maximum(np.where(certain, response.sigma, 1.0), 1e-12 * np.abs(response.response) + 1e-300) ** 2, 1.0)
     reach = main_lobe(WindowShape.of("hann", 16, 0.5))
-    weight[: reach - 1] *= 1e-6  # what the removed mean spoils
+    weight[: reach - 1] *= 1e-6  # lines biased by the removed mean
     return response, weight, np.asarray(point, dtype=np.int64)
 
 
@@ -270,7 +270,7 @@ def _mean_response(response: FrequencyResponse, weight: FloatArray, point: NDArr
 
 
 def _sigma(response: FrequencyResponse, weight: FloatArray, point: NDArray[np.int64]) -> FloatArray:
-    """Of each point's mean; errors of neighbouring lines are alike."""
+    """Sigma of each point's mean; errors of neighbouring lines are correlated."""
     total = np.bincount(point, weight)
     many = np.bincount(point) > 1
     alike = 1.0 + 2.0 * float(np.sum(response.line_correlation[1:]))
@@ -279,7 +279,7 @@ def _sigma(response: FrequencyResponse, weight: FloatArray, point: NDArray[np.in
 
 
 def _unwrapped(phase: FloatArray, trusted: NDArray[np.bool_]) -> FloatArray:
-    """Without jumps of 360 degrees along the trusted points; the others lie near them."""
+    """The phase without jumps of 360 degrees along the trusted points; the others are placed near them."""
     if int(trusted.sum()) < 2:
         return phase
     place = np.arange(phase.size)
@@ -313,7 +313,7 @@ def _zoom(data: AxisData, base: GreyboxFit) -> tuple[int, int]:
     power = scipy.signal.oaconvolve(base.error, np.full(smooth, 1.0 / smooth), mode="same") ** 2
     skip = min(int(0.5 * data.sampling_rate), power.size // 4)  # the simulation starts from rest
     worst = skip + int(np.argmax(power[skip:]))
-    within = next(step for step in data.steps if worst < step.stop)  # of one recording
+    within = next(step for step in data.steps if worst < step.stop)  # within one recording
     start = min(max(worst - width // 2, within.start), within.stop - width)
     return start, start + width
 

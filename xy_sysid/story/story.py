@@ -1,6 +1,6 @@
-"""The story of one axis, from the rigid model to the noise floor: where the model fails, which effect is missing, and the error after each step.
+"""The story of one axis, from the rigid model to the noise floor: where the model fails, the missing effect, and the error after each step.
 
-Each function takes a story and gives the next one. ``run`` is a run of the axis, or all of its stretches. A story holds plain numbers and short
+Each function takes a story and returns the next one. ``run`` is a run of the axis, or all of its runs. A story holds plain numbers and short
 pictures only: it can be sent to another process, and written as a document (``document``).
 """
 
@@ -33,11 +33,11 @@ HELPS_NO_MORE = "No effect of the library helps any further."
 
 @dataclass(frozen=True, slots=True)
 class Story:
-    """One axis' story.
+    """The story of one axis.
 
     rungs: the fits so far, the rigid base first; empty if the data do not suffice (``diagnosis`` then says what lacks); pictures: of each
     diagnosis: what is missing in the base, None before it was asked; tolerance: of the signal, in the noise floor
-    note: what the last act could not do; empty if it did
+    note: why the last action failed; empty if it succeeded
     """
 
     axis: str
@@ -62,12 +62,12 @@ class Story:
         return self.now.effects if self.now is not None else ()
 
     def only_base(self) -> Story:
-        """Back at the rigid base; the diagnosis stays."""
+        """The story with the rigid model only; the diagnosis is kept."""
         return replace(self, rungs=self.rungs[:1], pictures=self.pictures[:1], note="")
 
 
 def begin(run: Data, library: Library = STANDARD, tolerance: float = EPSILON) -> Story:
-    """The rigid base, fitted to gap-free samples; without steps, but with a diagnosis, if the data do not suffice."""
+    """The rigid model, fitted to gap-free samples; no steps but a diagnosis if the data do not suffice."""
     runs, story = runs_together(run), _none(run, tolerance)
     data = prepared(story.sampling_rate, [(one.voltage, one.position) for one in runs], tolerance, story.units)
     if isinstance(data, str):
@@ -76,12 +76,12 @@ def begin(run: Data, library: Library = STANDARD, tolerance: float = EPSILON) ->
 
 
 def diagnosed(story: Story, run: Data, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
-    """With the answer to: which effect is missing in the rigid base? The model stays what it is. budget, clock: see ``diagnosis.of_run``."""
+    """The story with the diagnosis of the rigid model: the missing effect. The model is unchanged. budget, clock: see ``diagnosis.of_run``."""
     return replace(story, diagnosis=diagnose(run, library, budget, clock, tolerance=story.tolerance).plain(), note="")
 
 
 def added(story: Story, run: Data, name: str, library: Library = STANDARD) -> Story:
-    """With one more effect, everything refitted together, as the diagnosis did if it was its next step; a relative of the same family is replaced.
+    """The story with one more effect and a full refit, taken from the diagnosis if it is its next step; a relative of the same family is replaced.
 
     Raises BadInput for a name that is unknown, in every model, or in this one.
     """
@@ -102,7 +102,7 @@ def added(story: Story, run: Data, name: str, library: Library = STANDARD) -> St
 
 
 def removed(story: Story, run: Data, name: str, library: Library = STANDARD) -> Story:
-    """Without one effect, the rest refitted; raises BadInput if it is not in the model."""
+    """The story without one effect, the rest refitted; raises BadInput if it is not in the model."""
     if name not in story.effects:
         raise BadInput("effect", repr(name), ", ".join(story.effects) or "none, the model is the rigid base", "Choose one that is in the model.")
     data = _data(story, run)
@@ -110,7 +110,7 @@ def removed(story: Story, run: Data, name: str, library: Library = STANDARD) -> 
 
 
 def next_best(story: Story, run: Data, library: Library = STANDARD) -> Story:
-    """With the effect that helps most now; with a note instead if nothing is left to explain, or nothing helps."""
+    """The story with the effect that helps most; with a note instead if there is nothing to explain, or nothing helps."""
     if story.now is None:
         return story
     planned = _planned(story)
@@ -127,7 +127,7 @@ def next_best(story: Story, run: Data, library: Library = STANDARD) -> Story:
 
 
 def auto(story: Story, run: Data, library: Library = STANDARD) -> Story:
-    """Add the next best until the floor is reached or nothing helps, then take out what is no longer needed."""
+    """Add the best effect until the floor is reached or nothing helps, then remove effects that are no longer needed."""
     while len(story.effects) < MOST_EFFECTS:
         before, story = len(story.rungs), next_best(story, run, library)
         if len(story.rungs) == before:
@@ -136,7 +136,7 @@ def auto(story: Story, run: Data, library: Library = STANDARD) -> Story:
 
 
 def pruned(story: Story, run: Data, library: Library = STANDARD) -> Story:
-    """Without the effects that are no longer needed, and with simpler relatives that do as well; the same story if all stay."""
+    """Remove effects that are no longer needed, and use simpler relatives that fit as well; returns the same story if nothing changes."""
     if len(story.effects) < 2:
         return story
     data = _data(story, run)
@@ -147,14 +147,14 @@ def pruned(story: Story, run: Data, library: Library = STANDARD) -> Story:
 
 
 def tell(run: Data, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
-    """The whole story of one axis: base, diagnosis, and every effect that it needs; the base is that of the diagnosis. budget, clock: as there."""
+    """The full story of one axis: rigid model, diagnosis, and every needed effect. budget, clock: see ``diagnosis.of_run``."""
     found = diagnose(run, library, budget, clock)
     story = replace(_none(run, EPSILON), diagnosis=found.plain())
     return auto(_based(story, _data(story, run), found.base), run, library) if found.rungs else story
 
 
 def allowed(name: str, library: Library = STANDARD) -> None:
-    """Raises BadInput, which names the effects that may be added, for a name that may not."""
+    """Raises BadInput, with the names of the effects that may be added, for any other name."""
     names = [effect.name for effect in library.acting]
     if name in library.effects and name not in names:
         raise BadInput("effect", repr(name), ", ".join(names), "This one is part of every model; leave it out.")
@@ -179,13 +179,13 @@ def _data(story: Story, run: Data) -> AxisData:
 
 
 def _planned(story: Story) -> Rung | None:
-    """What the diagnosis has fitted already as the next step from here."""
+    """The next step from here, if the diagnosis has already fitted it; else None."""
     rungs = story.diagnosis.rungs if story.diagnosis is not None else ()
     return next((after for here, after in pairwise(rungs) if after.came and _stands_on(story, here)), None)
 
 
 def _searched(story: Story) -> bool:
-    """The diagnosis has tried everything from here, and no more helped: to search once more would say the same."""
+    """True if the diagnosis has searched from this model without finding more: another search would give the same result."""
     rungs = story.diagnosis.rungs if story.diagnosis is not None else ()
     return bool(rungs) and _stands_on(story, rungs[-1])
 
@@ -200,7 +200,7 @@ def _grown(story: Story, data: AxisData, found: GreyboxFit, came: Sequence[str] 
 
 
 def _shown(story: Story, data: AxisData, rung: Rung, found: GreyboxFit) -> Story:
-    """The story with one more rung, and the pictures of its fit."""
+    """The story with one more step, and the figure data of its fit."""
     assert story.measured is not None
     return replace(story, rungs=(*story.rungs, rung), pictures=(*story.pictures, pictures(data, found, story.measured)), note="")
 
@@ -211,7 +211,7 @@ def _model(rung: Rung, library: Library) -> AxisModel:
 
 
 def _fit_of(story: Story, data: AxisData, library: Library, rung: Rung | None = None) -> GreyboxFit:
-    """The fit of a rung again, of the newest without one: by one simulation, or as it was made where free simulation cannot judge it."""
+    """The fit of a step (default: the newest), recomputed by one simulation, or by one-step prediction if the step was judged so."""
     rung = rung or story.rungs[-1]
     model = _model(rung, library)
     alone = one_step_effect(model)

@@ -9,13 +9,13 @@ from xy_sysid.time_models.output_error import Told
 from xy_sysid.time_models.servo import Servo
 from xy_sysid.units import moved
 
-GOOD = 0.9  # of the power, from which a model describes a record
+GOOD = 0.9  # fraction of the power from which a model describes a record
 SETTLED = 3.0  # time constants after which a first order has settled to 5 %
-REPEATS = 5.0  # samples over which an error that goes on is no noise
+REPEATS = 5.0  # samples; an error that is correlated for longer is not noise
 
 
 def first_order_words(found: FirstOrder) -> tuple[str, ...]:
-    """The answer, then each thing that these tests do not tell, with what would."""
+    """The result, then each quantity that these tests do not determine, with a test that would."""
     share = f"{100.0 * max(found.explained, 0.0):.4g} %"
     left = moved(found.error, found.units.speed)
     if found.explained >= GOOD:
@@ -62,7 +62,7 @@ def first_order_words(found: FirstOrder) -> tuple[str, ...]:
 
 
 def servo_words(found: Servo, inertia: float | None) -> tuple[str, ...]:
-    """The answer, then everything that target and angle alone do not determine."""
+    """The result, then everything that target and angle alone do not determine."""
     share, left = f"{100.0 * max(found.explained, 0.0):.4g} %", moved(found.error, found.units.output)
     if found.explained >= GOOD:
         said = [f"The servo with its controller explains {share} of the angle that no fit saw, simulated from the target alone; {left} rms is left."]

@@ -1,7 +1,7 @@
 """First order with delay and friction, from short step and ramp tests: tau v' + v = gain (u - friction sign(v) - load).
 
-The same in the terms of robot builders (WPILib's feedforward): u = kS sign(v) + kV v + kA v', with kS the friction, kV = 1 / gain and
-kA = tau / gain. Between samples the input is held and the motion is exact, with stops where the speed passes zero.
+In the terms of robot builders (WPILib's feedforward): u = kS sign(v) + kV v + kA v', with kS the friction, kV = 1 / gain and
+kA = tau / gain. Between samples the input is held and the solution is exact, including stops where the speed reaches zero.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from xy_sysid.time_models.output_error import Minimized, Told, shortest, solved
 from xy_sysid.units import Units
 
 FEWEST = 12  # samples
-MOST = 20_000  # samples of all recordings; what comes after them is not used
-CONSTANTS, DELAYS = 14, 14  # of the grid on which starts are looked for
-BEST = 3  # of them are followed
-THINNED = 4000  # samples on which they are looked for, at most
-LEVEL = 0.02  # part of the input's range that is another level
-TURNED = 0.05  # part of the largest speed that is a motion to the other side
-LONGEST = 0.5  # of the longest recording: a delay or a time constant beyond it is not seen
+MOST = 20_000  # samples of all recordings; later ones are not used
+CONSTANTS, DELAYS = 14, 14  # size of the grid for start values
+BEST = 3  # number of start values that are fitted
+THINNED = 4000  # samples used for the grid, at most
+LEVEL = 0.02  # fraction of the input's range that counts as another level
+TURNED = 0.05  # fraction of the largest speed that counts as motion in the other direction
+LONGEST = 0.5  # of the longest recording: a longer delay or time constant is not visible
 
 Term = Literal["friction", "load", "offset"]
 
 
 @dataclass(frozen=True, slots=True)
 class FirstOrder:
-    """What short tests tell of an axis.
+    """The result of short tests of an axis.
 
     quantities:  gain, time constant, delay, then those of friction, load and offset (both in one) that the data tell; and kV, kA, kS
     levels:      of the input that last; both_ways: it moves in both directions; settled: time constants that the longest level lasts
@@ -122,7 +122,7 @@ def _fitted(rate: float, inputs: Sequence[FloatArray], speeds: Sequence[FloatArr
 
 
 def _longest(rate: float, inputs: Sequence[FloatArray]) -> float:
-    """The longest delay that is looked for, s."""
+    """The longest delay that is searched, s."""
     return LONGEST * max(map(len, inputs)) / rate
 
 
@@ -134,7 +134,7 @@ def _terms(values: FloatArray, terms: tuple[Term, ...]) -> tuple[float, float]:
 
 
 def _starts(rate: float, inputs: Sequence[FloatArray], speeds: Sequence[FloatArray], terms: tuple[Term, ...], longest: float) -> list[FloatArray]:
-    """The best of a grid of time constants and delays: for each of them the rest is linear least squares."""
+    """The best start values from a grid of time constants and delays; for each of them the rest is linear least squares."""
     step = max(sum(map(len, speeds)) // THINNED, 1)
     target = np.concatenate([item[::step] for item in speeds])
     turned = [np.sign(np.where(np.abs(v) > TURNED * np.abs(target).max(), v, 0.0)) for v in speeds]
@@ -163,7 +163,7 @@ def _starts(rate: float, inputs: Sequence[FloatArray], speeds: Sequence[FloatArr
 
 
 def _lagged(values: FloatArray, keep: float) -> FloatArray:
-    """(n,) first-order answer to held values, from rest at the first."""
+    """(n,) first-order response to held values, from rest at the first."""
     return np.asarray(scipy.signal.lfilter([0.0, 1.0 - keep], [1.0, -keep], values), dtype=np.float64)
 
 

@@ -1,7 +1,7 @@
 """Output error: the parameters with the smallest error between simulation and measurement, with their uncertainty.
 
-What a small model leaves is no white noise. The covariance of the parameters is therefore White's sandwich with the autocovariance of the
-scores up to the lag at which the error forgets itself (Newey & West, Econometrica 55, 1987; Ljung, System Identification, 2nd ed., sec. 9.3).
+The residual error of a small model is not white noise. Therefore the covariance of the parameters is White's sandwich with the autocovariance of
+the scores, up to the lag at which the error is uncorrelated (Newey & West, Econometrica 55, 1987; Ljung, System Identification, 2nd ed., sec. 9.3).
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ import scipy
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.tables import Table
 
-FORGOTTEN = 0.1  # autocorrelation at which an error has forgotten itself
-FLAT = 1e-5  # smallest singular value of the scaled Jacobian, of the largest, of parameters that the data tell
-FURTHEST = 0.2  # of a record: lags beyond are not told by it
+FORGOTTEN = 0.1  # autocorrelation below which an error counts as uncorrelated
+FLAT = 1e-5  # singular value of the scaled Jacobian, relative to the largest, below which the data do not determine a direction
+FURTHEST = 0.2  # of a record: longer lags cannot be estimated
 
 Simulate = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """A number with its 95 % interval; both ends infinite where the data do not tell it."""
+    """A number with its 95 % interval; both ends are infinite if the data do not determine it."""
 
     name: str
     value: float
@@ -35,7 +35,7 @@ class Told:
 
     @property
     def told(self) -> bool:
-        """The interval does not hold zero."""
+        """True if the interval excludes zero."""
         return bool(np.isfinite(self.low) and np.isfinite(self.high) and self.low * self.high > 0.0)
 
 
@@ -67,11 +67,11 @@ class Minimized:
 
     @property
     def tells(self) -> bool:
-        """Every combination of parameters is told by the data."""
+        """True if the data determine every combination of parameters."""
         return self.flatness > FLAT
 
     def length(self, independent: float) -> float:
-        """Description length, nats, of so many independent numbers: the error's cost, and each parameter's (Rissanen 1978, Schwarz 1978)."""
+        """Description length, nats, for this many independent numbers: the error's cost, and each parameter's (Rissanen 1978, Schwarz 1978)."""
         return independent * float(np.log(max(self.cost, 1e-300))) + 0.5 * self.values.size * float(np.log(max(independent, 2.0)))
 
     def parameter(self, name: str, place: int, unit: str, low: float, high: float) -> Told:
@@ -92,7 +92,7 @@ class Minimized:
 
 
 def shortest(found: Sequence[Minimized]) -> int:
-    """Place of the solution with the shortest description, of one record by several models of which the data tell every parameter."""
+    """Index of the solution with the shortest description, among models of one record all of whose parameters are determined."""
     told = [k for k, item in enumerate(found) if item.tells] or [len(found) - 1]
     independent = max(found[k].independent for k in told)
     return min(told, key=lambda k: found[k].length(independent))
@@ -123,7 +123,7 @@ def solved(
 
 
 def _judged(values: FloatArray, error: FloatArray, slope: FloatArray, sizes: Sequence[int]) -> Minimized:
-    """slope: (n, p) of the simulation."""
+    """The minimum with its covariance; slope: (n, p) derivatives of the simulation."""
     norms = np.linalg.norm(slope, axis=0)
     seen = norms > 0.0
     edges = np.cumsum([0, *sizes])
@@ -153,14 +153,14 @@ def _judged(values: FloatArray, error: FloatArray, slope: FloatArray, sizes: Seq
 
 
 def _memory(error: FloatArray, parts: Sequence[slice]) -> int:
-    """Samples after which the error has forgotten itself."""
+    """Number of samples after which the error is uncorrelated."""
     longest = max(part.stop - part.start for part in parts)
     most = max(int(FURTHEST * longest), 1)
     return next((lag for lag in range(1, most) if _correlation(error, parts, lag) < FORGOTTEN), most)
 
 
 def _correlation(error: FloatArray, parts: Sequence[slice], lag: int) -> float:
-    """Of the error with itself so many samples later, within recordings."""
+    """Autocorrelation of the error at this lag, within recordings."""
     power = float(error @ error)
     shared = sum(float(error[part][:-lag] @ error[part][lag:]) for part in parts if part.stop - part.start > lag)
     return shared / power if power > 0.0 else 0.0

@@ -2,8 +2,8 @@
 
     q'' = limited(kp (target - q)) - damping q' - friction sign(q') - load      all divided by the inertia
 
-As MuJoCo's position actuator does it (kp, forcerange; damping, frictionloss, armature of the joint). Target and angle hold no mass and no
-torque, so every number is one over the inertia: 1/s^2, 1/s, rad/s^2. A derivative gain of the controller acts as damping of the joint does.
+As MuJoCo's position actuator (kp, forcerange; damping, frictionloss, armature of the joint). Target and angle contain no mass and no
+torque, so every number is divided by the inertia: 1/s^2, 1/s, rad/s^2. A derivative gain of the controller has the effect of joint damping.
 Between samples the target is held; steps are implicit in friction and damping, and stops are exact (Moreau 1988; Stewart & Trinkle 1996).
 """
 
@@ -25,17 +25,17 @@ from xy_sysid.units import Units
 FINEST = 1e-3  # s, of a step
 FEWEST = 40  # samples in all
 SHORTEST = 8  # samples of a recording that is used
-HELD = 4  # every fourth recording judges; of fewer the last quarter of each
+HELD = 4  # every fourth recording is held out; with fewer, the last quarter of each
 FREQUENCIES, DAMPINGS, DELAYS = (5.0, 10.0, 20.0, 40.0, 80.0), (0.3, 0.7, 1.5), (0.5, 2.5)  # rad/s, ratios and samples of the starts
 LONGEST_DELAY = 0.25  # s
-BEST = 3  # starts that are followed
-REACHED = 0.02  # part of the time at the limit from which it is told
-STILL = 0.02  # part of the range of the target within which an angle stands
+BEST = 3  # start values that are fitted
+REACHED = 0.02  # fraction of the time at the limit from which the limit is determined
+STILL = 0.02  # of the target's range: a smaller change of an angle counts as rest
 
 
 @dataclass(frozen=True, slots=True)
 class Servo:
-    """What target and angle tell.
+    """The result from target and angle.
 
     quantities:   stiffness (kp / inertia), damping (kd and damping of the joint, / inertia), friction, load, limit (/ inertia), delay; then
                   frequency (Hz) and damping_ratio of the closed loop
@@ -79,7 +79,7 @@ def servo(runs: Sequence[Run]) -> Servo:
 
 
 def _split(runs: list[Run]) -> tuple[list[Run], list[Run]]:
-    """Recordings that are fitted, and those that judge."""
+    """(recordings to fit, held-out recordings)."""
     if len(runs) >= 2 * HELD:
         return [run for k, run in enumerate(runs) if k % HELD != HELD - 1], [run for k, run in enumerate(runs) if k % HELD == HELD - 1]
     cut = [len(run) - len(run) // HELD for run in runs]
@@ -117,7 +117,7 @@ def _simulated(run: Run, values: FloatArray) -> FloatArray:
 
 
 def _at_limit(runs: Sequence[Run], values: FloatArray) -> float:
-    """Part of the samples at which the torque asked for is at least the limit."""
+    """Fraction of the samples at which the requested torque is at least the limit."""
     if values.size < 6:
         return 0.0
     asked = np.concatenate([np.abs(values[0] * (run.voltage - _simulated(run, values))) for run in runs])
@@ -183,7 +183,7 @@ def _run(
     for n in range(target.shape[0]):
         out[n] = q
         for k in range(steps):
-            end = n + (k + 1.0) / steps - late  # the mean of the held target over this step, so that a delay need be no whole step
+            end = n + (k + 1.0) / steps - late  # mean of the held target over this step, so that a delay need not be an integer number of steps
             place = int(np.floor(end))
             after = min((end - place) * steps, 1.0)
             now = target[min(place, target.shape[0] - 1)] if place >= 0 else start
