@@ -146,7 +146,7 @@ class ControllerNode(Node):
         self._over.set()
 
     def has_stopped(self) -> bool:
-        """True at once."""
+        """True once the thread of the clock has ended."""
         return not self._thread.is_alive()
 
     def last_words(self) -> None:

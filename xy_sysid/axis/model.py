@@ -143,7 +143,7 @@ class AxisModel:
         return (-values[0], *values[1:]) if self.gain < 0.0 and self.library[name].category == "force" else values
 
     def joined(self) -> AxisModel:
-        """The same model with several effects merged into one where their laws are equal."""
+        """The same model with several effects merged into one whose law is their sum, if there is one in the library."""
         own = dict(self.effects)
         for effect in self.library.acting:
             if effect.sum_of is not None and all(part in own for part in effect.sum_of.parts):

@@ -31,7 +31,7 @@ FINE = 1e5  # Hz at which the roots of a section are computed: far above any res
 TERMS = 10  # terms of a power series within a sub-step; as STIFF is 0.5, the first omitted term is below 1e-10
 STIFF = 0.5  # longest sub-step times the fastest rate
 ONE_MODE = 5  # length of a state with one resonance, the usual case, whose sums are unrolled
-CUTS = 0.004  # s: limit of sub-steps per sample over the requested rate, Hz, for any stiffness: a first call must not take minutes
+CUTS = 0.004  # s: limit of sub-steps per sample over the requested rate, Hz, for any stiffness: the first round of a fit must not take minutes
 
 
 @compiled

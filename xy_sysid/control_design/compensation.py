@@ -117,7 +117,8 @@ def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
 def alike(model: AxisModel, sampling_rate: float) -> tuple[AxisModel, ...]:
     """The model rewritten with other effects whose law is the same while sliding and differs at rest.
 
-    These are the parts of a sum, half in each direction, and friction whose breakaway ends within one sample; sampling_rate: Hz
+    These are one effect for its parts, the parts of one effect, half of the second part in it and half apart, and Coulomb friction for a
+    breakaway that ends within one sample; sampling_rate: Hz
     """
     joined = model.joined()
     found: list[AxisModel] = [joined, _without_breakaway(model, sampling_rate)]

@@ -214,7 +214,7 @@ def feedback(
 
 
 def loop_systems(model: PhysicalModel, sampling_rate: float) -> list[Sampled]:
-    """The sampled model for each sample of its parameters, and for the motor alone inside a gap: a loop must keep its margins with all of these.
+    """The sampled model, first as fitted, then with samples of its parameters, then the motor alone inside a gap: a loop keeps its margins with all.
 
     Raises BadInput where gain or pole are not determined by the data.
     """

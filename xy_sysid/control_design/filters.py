@@ -79,7 +79,7 @@ class Shaper:
 
     @property
     def duration(self) -> float:
-        """Delay that the shaper adds to a path, s."""
+        """Time by which the shaper makes a path longer, s."""
         return self.times[-1]
 
     def shape(self, path: SampledPath) -> SampledPath:

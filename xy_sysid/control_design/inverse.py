@@ -68,7 +68,7 @@ def feedforward(model: AxisModel, path: SampledPath, shake: float = 0.0) -> Feed
 
 
 def ahead_of(model: AxisModel, sampling_rate: float) -> float:
-    """s of path preview: delay, half a sample of the hold, and the remaining lead of each lag's inverse.
+    """s of path preview: delay, half a sample of the hold, and the part of each lag's time constant that its inverse leaves.
 
     That inverse is total + (total - old) / (exp(h / lag) - 1), which leads by h / (exp(h / lag) - 1) at low frequencies; h: a sample, s.
     """

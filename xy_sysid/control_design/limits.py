@@ -81,7 +81,7 @@ def _at_rest(model: AxisModel, low: float, high: float) -> float:
 
 
 def _ringing(model: AxisModel, sampling_rate: float) -> float:
-    """Period of the slowest mode of the axis, s: an acceleration that is built up within one period excites it least."""
+    """Period of the slowest mode of the attached masses, s, 0 without one: an acceleration built up within one period excites it least."""
     top, _ = sections(model, sampling_rate)
     if top.size == 1:
         return 0.0

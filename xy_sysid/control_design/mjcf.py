@@ -19,7 +19,7 @@ from xy_sysid.control_design.sample_step import sections
 from xy_sysid.effects import Effect
 from xy_sysid.samples.block import FloatArray
 
-SHORT = 1e-6  # m: deflection of bristles that represent friction which falls with speed
+SHORT = 1e-6  # m: deflection of bristles that represent friction which falls with speed and has none itself
 CRITICAL = 0.5  # of the damping at which such bristles do not swing on the mass
 TINY = 1e-9  # motor constant of a motor that has only friction or cogging
 RUBBING = 64_000.0  # Hz of the steps with dry friction: it leaves 0.2 % of the motion there, and 2 % at 16 kHz

@@ -158,7 +158,7 @@ def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray, 
 
 
 def begin(ready: Plant, state: FloatArray, speed: float, position: float = 0.0) -> None:
-    """Set the state to this speed, including the attached masses."""
+    """Set the state to this speed and position; the attached masses have the same speed."""
     top, _ = sections(ready.model, ready.sampling_rate)
     state[0], state[1] = position, speed
     if top.size > 1:

@@ -15,7 +15,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
 DEGREE = TURN / 360.0  # rad
-LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margins without a filter on the derivative; smaller is near instability
+LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margins without a filter on the derivative; smaller is near instability for a machine that warms up
 
 
 @dataclass(frozen=True, slots=True)

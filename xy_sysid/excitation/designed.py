@@ -24,7 +24,7 @@ AGAIN = "Design it again within these limits: xy-sysid next with --params."
 class Needs:
     """The requirements of an experiment on its axis.
 
-    voltage: the largest input; travel: the expected positions, with margin, from the axis's position at design (``start``)
+    voltage: the largest input; travel: the expected positions, with margin, for a start at ``start``, where the axis stood at design
     reach: the expected motion without margin, relative to its start; within: the ends of travel given to the design
     speed, acceleration: the largest expected, with margin
     """
@@ -108,7 +108,7 @@ def of_an_experiment(name: str) -> bool:
 
 
 def _checked(document: object, where: str) -> Mapping[str, Any]:
-    """The experiment of a document, with numbers as floats."""
+    """The experiment of a document, with all names and numbers checked."""
     if not isinstance(document, Mapping) or not isinstance(document.get("experiment"), Mapping):
         raise BadInput(where, "no experiment", "a file of xy-sysid next", "Make one: xy-sysid next REC -o next.yaml.")
     told = dict(document["experiment"])

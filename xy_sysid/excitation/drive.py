@@ -275,7 +275,7 @@ class Drive:
                 stream.next(n)
 
     def catch_up(self, missed: int) -> Block:
-        """The next sample after ``missed`` skipped ones. The block has all samples executed by the controller since the last call, if known."""
+        """The next sample, after ``missed`` skipped ones; a drive that knows what the controller executed meanwhile returns these samples, too."""
         self.skip(missed)
         return self.next(1)
 

@@ -5,7 +5,7 @@ per volt, and compared with the encoder. A constant encoder reading is accepted 
 (STRIDE of a brake zone). Therefore friction and dead zones up to ``breakaway``, and low voltage at rest, are no faults.
 
     a step          faster than FASTEST times what the voltage limit gives: the encoder leaps, or its scale is wrong
-    no answer       a stride was possible, and the encoder is constant or has never shown LEAST of it: frozen, or a wrong scale
+    no answer       a stride was possible, and the encoder is constant, or has never shown LEAST of it or of its variation: frozen, or a wrong scale
     the wrong way   slow motion against the voltage: a sign is wrong
     outside         beyond a limit and not coming back, or not slowed by full inward voltage
 

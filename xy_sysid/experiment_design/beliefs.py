@@ -31,7 +31,7 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True)
 class Belief:
-    """effects: their names; model: the most likely; draws: models that the data allow, most likely first
+    """effects: their names; model: the most likely; draws: models that the data allow, the first is ``model``
     scale: coordinates of each parameter; precision: (k, k) in these coordinates; free: parameters of the effects
     force, motion: power of the unmodelled force, V^2, and of the unmodelled motion, m^2/s^2
     """

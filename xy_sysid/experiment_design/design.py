@@ -28,7 +28,7 @@ class Judged:
     """An experiment with its evaluation.
 
     seconds: of steady motion after which the sets are distinguished with 95 %, infinite if ``most`` do not suffice; probability: of this
-    at the end; each: powers of each draw; broken: name of a limit that it would exceed, or empty; shortest: its least duration, s
+    at the end; each: powers of each draw; broken: name of a limit that it would exceed, with margin, or empty; shortest: its least duration, s
     """
 
     experiment: Experiment
@@ -68,7 +68,7 @@ class Design:
         return self if self.best is None else replace(self, best=self.best.lasting(seconds))
 
     def broken(self, experiment: Experiment) -> str:
-        """Name of the limit that an experiment would exceed at any time with any draw, or empty."""
+        """Name of the limit that an experiment would exceed, with margin, at any time with any draw, or empty."""
         return broken_in_time([model for belief in self.beliefs for model in belief.draws], self.rate, self.limits, experiment)
 
     @property
@@ -122,7 +122,7 @@ def design(
 
 
 def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimits, experiment: Experiment) -> str:
-    """Name of the limit that an experiment would exceed at any time with any of the models, or empty. rate: Hz"""
+    """Name of the limit that an experiment would exceed, with margin, at any time with any of the models, or empty. rate: Hz"""
     drive = experiment.drive(rate, experiment.seconds, limits.start)
     return next((word for model in models if (word := limits.broken(move(model, rate, drive, COARSE)))), "")
 

@@ -109,6 +109,6 @@ def _width(item: Information, seconds: float) -> float:
 
 
 def _seconds(found: list[Information], most: float) -> float:
-    """s after which the mean of the intervals reaches the wanted width, ``most`` at most."""
+    """s after which the median of the intervals reaches the wanted width, ``most`` at most."""
     steps = np.arange(2.0, most + 1.0, 2.0)
     return next((float(step) for step in steps if float(np.median([_width(item, float(step)) for item in found])) <= WIDTH), most)

@@ -140,7 +140,7 @@ def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: Ma
 
 
 def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Precision, seed: int) -> Sequence[Experiment]:
-    """Proposals, and neighbours of the best ones."""
+    """The best proposals, and the neighbours of the best one."""
     rate, most = setting.layout.sampling_rate, limits.seconds - limits.ramp
     first = proposals(limits, rate, seed)
     judged: list[tuple[float, float, int, Experiment]] = []

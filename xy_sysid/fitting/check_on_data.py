@@ -20,7 +20,7 @@ AT_THE_FLOOR = 1.3  # rms residual in sigma up to which a model from other data 
 
 @dataclass(frozen=True, slots=True)
 class ModelCheck:
-    """Result of a model on held-out data.
+    """Result of a model on data to which it was not fitted.
 
     frequency, measured, predicted: (m,) trusted lines, Hz; the data; the model through hold and window
     sigmas: (m,) |measured - predicted| in standard deviations of the measurement

@@ -82,7 +82,7 @@ def root_estimates(task: Problem, at: Point, roots: ComplexArray, inner: FloatAr
     roots: of the denominator ("pole") or the numerator ("zero") at the point; inner: covariance of its parameters
     Gives <name>_i, or <name>_i.real and .imag, and frequency and damping of each oscillating pair.
     """
-    part, coefficients, first = (at.denominator, at.a, at.b.size) if name == "pole" else (at.numerator, at.b, 0)  # c_0 comes first
+    part, coefficients, first = (at.denominator, at.a, at.b.size) if name == "pole" else (at.numerator, at.b, 0)  # first: index of c_0
     discrete = task.structure.domain == "z"
     scale, unit = (1.0, "") if discrete else (task.plan.scale, "rad/s")
     size = coefficients.size - int(name == "pole")

@@ -36,7 +36,7 @@ def band_of(response: FrequencyResponse, settings: IdentifierSettings) -> Freque
 
 
 def _integrators(response: FrequencyResponse) -> int:
-    """0, 1 or 2 integrators: the number on which magnitude slope and phase of the lowest lines agree."""
+    """0, 1 or 2 integrators: the smaller of the numbers that magnitude slope and phase of the lowest lines show."""
     lines = slice(0, LOW)
     slope = float(np.polyfit(np.log(response.frequency[lines]), np.log(np.abs(response.response[lines])), 1)[0])
     phase = float(np.angle(np.sum(response.response[lines] / np.abs(response.response[lines]))))

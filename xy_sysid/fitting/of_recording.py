@@ -38,7 +38,7 @@ LONGEST = 16_384  # samples of a window, if a single one suffices
 MOST_ON_GRID = 0.5  # of the possible windows; if the grid holds fewer, each stretch has windows from its own start
 COVERED = 0.5  # of the samples: least fraction in such windows
 MANY = 6  # periods needed if feedback or friction shape the input
-MOST_TRANSIENT = 2  # number of periods of a stretch from which none can be left out
+MOST_TRANSIENT = 2  # largest number of periods of a stretch from which none is left out
 BEST = "Several realisations of a periodic input: noise and nonlinear distortion are separated, and sigma is the larger of the two."
 TRANSIENT = 1  # periods left out at the start of a periodic recording
 USUAL = IdentifierSettings()
@@ -182,7 +182,7 @@ def _samples(run: slice) -> int:
 
 
 def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], names: tuple[str, str] = ("input", "output")) -> None:
-    """Raises BadInput for an input or output that is constant, or whose square would overflow."""
+    """Raises BadInput for an input or output that is constant, or whose square would overflow or underflow."""
     acts = "Excite this axis.", "Check the encoder, and that the axis is enabled."
     for name, values, unit, act in zip(names, (u, y), units, acts, strict=True):
         if values.size == 0 or float(np.ptp(values)) == 0.0:
@@ -242,9 +242,9 @@ def _coherence(frf: FrequencyResponse, settings: IdentifierSettings, periodic: b
         return [f"Only {frf.averages:.1f} independent windows: no uncertainty, so no line is trusted. Record longer, or shorten the window."]
     if periodic:
         return []
-    none = 1.0 - settings.min_coherence  # probability that a line without coherence stays below
+    none = 1.0 - settings.min_coherence  # to the power averages - 1: probability that a line without coherence has more
     chance = none ** (frf.averages - 1.0) * len(frf)
-    usual = 1.0 - none * 0.1 ** (1.0 / (frf.averages - 1.0))  # nine of ten lines without coherence are below this by chance
+    usual = 1.0 - none * 0.1 ** (1.0 / (frf.averages - 1.0))  # nine of ten such lines have less coherence than this by chance
     trusted = int(frf.trusted.sum())
     many = trusted > chance + HARDLY * math.sqrt(2.0 * chance)
     if many or (trusted and float(np.median(frf.coherence[frf.trusted])) > usual):

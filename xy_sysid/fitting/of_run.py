@@ -157,7 +157,7 @@ def fit_response(
     settings = settings_for(response, settings)
     method, choice = method or Method(), None
     try:
-        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts reject
+        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts judge
             if method.domain == "s" and method.estimator not in FIXED:
                 settings, choice = with_orders(response, settings)
             if choice is not None and (method.estimator, method.weighting) == ("best", "sigma"):

@@ -181,5 +181,5 @@ def _still() -> FloatArray:
 
 
 def finite(item: Estimate) -> bool:
-    """True if the value and both ends of the interval are finite."""
+    """True if the value is finite and no end of the interval is infinite; NaN ends (no interval) are allowed."""
     return math.isfinite(item.value) and not any(math.isinf(end) for end in (item.low, item.high))

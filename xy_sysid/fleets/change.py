@@ -9,7 +9,7 @@ and level and size are integrated out.
 
 The sum of the ratios over all starts is the Shiryaev-Roberts statistic. Without a change its mean is n after n recordings, on average over
 the grid. Therefore a threshold c is passed at most once in c recordings. The allowed rate of false alarms gives c. One outlying recording,
-or two in a row (another load, a loose cable), are not a change: at most rates a change needs a third recording to be declared.
+or two in a row (another load, a loose cable), are not a change: with most rates a change needs a third recording to be declared.
 
 Sources: Roberts, A comparison of some control chart procedures, Technometrics 8 (1966); Pollak & Siegmund, Approximations to the expected
 sample size of certain sequential tests, Ann. Statist. 3 (1975); Shin, Ramdas & Rinaldo, E-detectors, New England J. Statist. Data Sci. 2 (2023).
@@ -91,7 +91,7 @@ def _evidence(series: Series) -> tuple[Evidence, tuple[int, ...]]:
         none[row] = parts.none
         each, change[row] = weighed(parts, shapes)
         odd[row] = np.log1p(each.sum(axis=0))
-        with np.errstate(divide="ignore"):  # of changes that have not started
+        with np.errstate(divide="ignore"):  # of outliers after this recording
             off = np.logaddexp(off, usual()[row] + parts.none + np.log(each))
     prior = usual()[:, None] + none
     share = np.exp(off - logsumexp(np.logaddexp(prior + odd, prior + change + np.log(ODD)), axis=0))

@@ -161,7 +161,7 @@ def _history(column: str, unit: str, rows: Sequence[Mapping[str, Any]]) -> Histo
 
 
 def _told(row: Mapping[str, Any], column: str) -> bool:
-    """True if there is a value whose interval has finite ends."""
+    """True if there is a finite value, without an interval or with finite ends, and it is not one of ONE_STEP in a row of that kind."""
     value, low, high = row.get(column), row.get(f"{column}_low"), row.get(f"{column}_high")
     ends = [end for end in (low, high) if end is not None]
     return value is not None and np.isfinite(value) and bool(np.all(np.isfinite(ends))) and not (row.get("one_step") and column in ONE_STEP)

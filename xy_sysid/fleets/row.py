@@ -88,7 +88,7 @@ def _fitted(response: FrequencyResponse) -> tuple[Fit, Validation]:
         return fit_response(response, settings)
     judged(response)
     try:
-        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts reject
+        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts judge
             choice = choose(response, structure_from(settings), thorough=False)
             return choice.fit, validate(choice.fit, response, choice=choice)
     except (np.linalg.LinAlgError, ZeroDivisionError):

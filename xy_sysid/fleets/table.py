@@ -177,7 +177,7 @@ def _each_once(rows: Sequence[Row]) -> list[Row]:
 
 
 def file_name(machine: str) -> str:
-    """File name for a machine: its name, or a unique hash if that is not a valid file name."""
+    """File name for a machine: its name, or a plain form of it with a hash if the name is not a valid file name."""
     plain = NAMED.sub("_", machine).strip("._") or "machine"
     return f"{plain}{ENDING}" if plain == machine else f"{plain}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}{ENDING}"
 

@@ -103,13 +103,13 @@ class Control:
         return waits
 
     def pace(self) -> str:
-        """How much faster than real time the simulated machine runs, in words; empty for a real machine."""
+        """How much faster than real time the simulated machine runs, in words; empty at real time, and for a real machine."""
         if self._speed == 1.0 or not self._speed or "ballscrew" not in self._session.heard.present:
             return ""
         return f" · simulated, {self._speed:g} times faster than real time" if self._speed > 0 else " · simulated, at full speed"
 
     def _paced(self, values: dict[str, object]) -> None:
-        """Store the values; called in the link's thread, read later by ``refresh``."""
+        """Store the values; called in the link's thread, read later by ``pace``."""
         speed = values.get("speed")
         if isinstance(speed, float):
             self._speed = speed if speed else -1.0
@@ -152,7 +152,10 @@ class Control:
         will_move.ask(self._session, words, "Activate", "sure", lambda: self._go("activate"))
 
     def _ask_override(self, held: str) -> None:
-        """Activate twice after the user has seen the names: the first call lists the nodes that hold STOP, the second overrides them."""
+        """Call release_stop twice after the user has seen the names: the first call lists the nodes that hold STOP, the second overrides them.
+
+        If other nodes hold STOP by then, nothing is overridden. It does not activate: the user presses Activate afterwards.
+        """
         session = self._session
 
         def ask(then: Callable[[bool, str], None]) -> None:

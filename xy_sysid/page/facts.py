@@ -144,7 +144,7 @@ def coherence_fact(frequency: FloatArray, coherence: FloatArray) -> Fact:
 
 
 def dropped_words(values: Values) -> str:
-    """Number of dropped samples with reasons; empty while nothing is known."""
+    """Number of dropped windows with reasons; empty while nothing is known."""
     if "dropped windows" not in values:
         return ""
     reasons = [f"{_reason(key)} {values[key]}" for key in values if key.startswith("dropped windows: ") and values[key] != "0"]

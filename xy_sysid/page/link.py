@@ -1,7 +1,7 @@
 """The page's own ROS 2 node: it receives results and stories and sends orders. It is restarted if it fails.
 
 The node runs in its own thread (``_Line``). ``Link`` supervises it and survives its failure. STOP has its own publisher and is
-published from the caller's thread; every other order goes to the node that is then alive.
+published from the caller's thread; every order, also the service calls of STOP, goes to the node that is then alive.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class Link:
     # orders, from any thread
 
     def transition(self, label: str, told: Told) -> None:
-        """configure, activate, deactivate or clean up the excitation; activate also releases STOP."""
+        """configure, activate, deactivate or clean up the excitation; activate also releases the STOP of this page."""
         if label == "activate":
             self._wire.put(False)
         request = ChangeState.Request(transition=Transition(label=label))
@@ -275,7 +275,7 @@ class _Line:
         future.add_done_callback(self.wall.around(done))
 
     def stop(self, stop: _Stop) -> None:
-        """Request deactivation and check the state; repeat until the excitation is at rest."""
+        """Request deactivation and check the state; repeat until the excitation is at rest, for STOP_GIVES_UP at most."""
         now = time.monotonic()
         if self.heard.at_rest_since(stop.begun):  # its status counts if its services do not answer
             stop.confirm("at rest")

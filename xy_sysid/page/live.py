@@ -56,7 +56,7 @@ class Live:
         self._numbers = itertools.count(1)
 
     def axes(self) -> tuple[str, ...]:
-        """Axes from which data were received."""
+        """Axes named in any received message."""
         return self.heard.axes()
 
     def document(self, axis: str) -> dict[str, Any] | None:

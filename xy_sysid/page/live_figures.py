@@ -23,7 +23,7 @@ MOST = 1200  # lines drawn
 LEAST = 0.3  # coherence of a trusted line
 SOLID, DASHED = {"color": MEASURED, "width": 1.8}, {"color": MODEL, "width": 1.8, "dash": "dash"}
 NOTABLE = 4.0  # standard errors above which a range of lines is shaded
-STRETCH = 3  # number of neighbouring lines that must exceed it
+STRETCH = 3  # number of neighbouring lines whose mean must exceed it
 
 
 def response_figure(

@@ -8,7 +8,7 @@ from xy_sysid.page.session import Message
 
 SHOWN = 4  # maximum number of messages on the page
 GOOD_STAYS, BAD_STAYS = 8.0, 60.0  # s that a message stays
-BEFORE = 30.0  # s before a page opens; it shows messages since then, because it may be a reload of a lost page
+BEFORE = 30.0  # s before a page opens; messages since then count as new to it, because it may be a reload of a lost page
 
 
 class Notices:

@@ -165,7 +165,7 @@ class Source(Protocol):
         ...
 
     def cancel(self, axis: str) -> None:
-        """Cancel the order of the axis."""
+        """Cancel the running work for the axis."""
         ...
 
     def used(self, axis: str) -> str:

@@ -28,7 +28,7 @@ from xy_sysid.page.story_card import StoryCard
 from xy_sysid.page.use_card import UseCard
 from xy_sysid.page.views import NOW, View, view_of, views
 
-SHORT = 3  # letters; a shorter axis name gets the word axis before it
+SHORT = 3  # letters; an axis name of at most this length gets the word axis before it
 
 
 class Panel:

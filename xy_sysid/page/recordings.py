@@ -94,7 +94,7 @@ class OpenRecording:
         return ""
 
     def awaits(self, axis: str) -> bool:
-        """True at first: the rigid model is fitted automatically."""
+        """True while the recording is open: the rigid model is fitted automatically."""
         return not self._problem
 
     def newer(self, axis: str) -> bool:
@@ -102,7 +102,7 @@ class OpenRecording:
         return False
 
     def cancel(self, axis: str) -> None:
-        """Cancel the order of this axis; the fit of another axis continues."""
+        """Cancel the running order of this axis. An order that waits for another axis is kept, and a message says so."""
         job = self._jobs.get(axis)
         if job is None or self._process.pid is None or not self._process.is_alive():
             return

@@ -37,7 +37,7 @@ def changes(knob_values: dict[str, Any], typed: dict[str, Any]) -> dict[str, Any
 
 
 def limits(item: Knob, units: Units = USUAL) -> str:
-    """The allowed range as text, 0 to 100 V, or the choices; units: display units of V and m."""
+    """The allowed range as text, 0 to 100 V, or the choices; units: of input and output, shown for V and m."""
     if item.choices:
         return ", ".join(item.choices)
     if item.low is None or item.high is None:

@@ -74,7 +74,7 @@ class SettleCard:
                 self._session.say(str(problem))
 
     def _ask_run(self) -> None:
-        """Ask for confirmation because a real machine will move, as for Activate."""
+        """Ask for confirmation if a real machine will move, as for Activate."""
         settling = self._session.settling
         if settling is None or not settling.waits:
             return

@@ -13,7 +13,7 @@ from xy_sysid.imports.several_files import others
 TEXTS = (".txt", ".log", ".json")  # rarely recordings: listed on request only
 LISTED = (*(ending for ending in TABLES if ending not in TEXTS), ".mcap", ".db3")
 MOST = 200  # recordings listed
-DEEP = 2  # folder levels below the shelf that are searched
+DEEP = 2  # folder levels that are searched, including the shelf itself
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 

@@ -28,7 +28,7 @@ OFTEN = {"excitation", "ballscrew", "identifier"}  # nodes that send a status at
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """One resonance estimate: seconds of data, Hz, its 95 % interval, the reference, and whether the alarm was on."""
+    """One resonance estimate: seconds of data, Hz, the reference in Hz, and whether the alarm was on."""
 
     seconds: float
     frequency: float
@@ -65,7 +65,7 @@ class TopicsState:
     own_stop: str = ""
 
     def axes(self) -> tuple[str, ...]:
-        """Axes from which data were received, sorted by name."""
+        """Axes named in any received array, status or story, sorted by name."""
         ends = {self._axis(end) for kind, _, end in (topic.partition("/") for topic in list(self.arrays)) if kind != COUPLING}
         return tuple(sorted(ends | self._named()))
 

@@ -111,7 +111,7 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
     training, unseen = split(recording, HELD_OUT)
     drive, moved = excitation(recording, axis), motion(recording, axis)
     try:
-        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts reject
+        with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts judge
             studied = replace(study_axis(training, axis, settings, period, refit=False), excitation=drive, motion=moved)
             if not studied.fits or studied.frf is None:
                 return studied, None

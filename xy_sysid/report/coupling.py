@@ -25,7 +25,7 @@ def coupling_figure(found: Coupling) -> go.Figure:
 
 
 def bands_figure(axes: Sequence[str], band_edges: FloatArray, least: FloatArray, most: FloatArray) -> go.Figure:
-    """Coupling in each band, split into its parts. band_edges: (bands + 1,) Hz; least, most: (bands,) fractions of the axis's own motion."""
+    """The figure of ``coupling_figure`` from its arrays. band_edges: (bands + 1,) Hz; least, most: (bands,) fractions of the axis's own motion."""
     figure = rows(1, shared=False, gap=0.0)
     edges = np.repeat(band_edges, 2)[1:-1]
     one, other = (plain(axis) for axis in axes)

@@ -111,7 +111,7 @@ def frequency_axis(figure: go.Figure, row: int, frequency: list[FloatArray]) -> 
 
 
 def turns(phases: list[FloatArray]) -> float:
-    """Tick spacing of a phase axis: 90 degrees, or more where labels would be too dense."""
+    """Tick spacing of a phase axis: 45 degrees, or more where labels would be too dense."""
     span = max(float(np.max(p)) for p in phases) - min(float(np.min(p)) for p in phases)
     return next((step for step in (45.0, 90.0, 180.0, 360.0, 720.0) if span <= 5.5 * step), 3600.0)
 

@@ -43,7 +43,7 @@ ROOTS = "Poles and zeros of the linear part, without the nonlinear effects."
 
 
 def status(story: Document | None) -> str:
-    """explained, partly explained, not explained, or no statement possible."""
+    """The state as text: explained, partly explained, not explained, or nothing can be said."""
     if story is None or not story["ladder"]:
         return "nothing can be said"
     first, last = story["ladder"][0], story["ladder"][-1]

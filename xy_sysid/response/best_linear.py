@@ -1,7 +1,7 @@
 """Best linear approximation from several realisations of a periodic input, with separate noise and nonlinear distortion.
 
 Within a realisation only noise differs from period to period. From one realisation (other random phases) to the next, the distortion by friction
-and other laws differs too: it looks like noise, but averaging over periods does not reduce it. So the scatter over periods gives the noise,
+and other nonlinear laws differs too: it looks like noise, but averaging over periods does not reduce it. So the scatter over periods gives the noise,
 and the scatter over realisations gives noise plus distortion. (Pintelon & Schoukens, System Identification, 2nd ed., sec. 4.3.1, the robust method;
 Schoukens, Vaes & Pintelon, IEEE Control Syst. Mag. 36 (2016), 38-69)
 """

@@ -238,7 +238,7 @@ def _by_band(frequency: FloatArray, response: ComplexArray, sigma: FloatArray) -
     size, most = np.zeros(there.size), np.zeros(there.size)
     for k, band in enumerate(there):
         inside = place == band
-        own = np.sqrt(np.prod([np.mean(np.abs(response[inside, i, i]) ** 2) for i in (0, 1)]))  # mean in the band
+        own = np.sqrt(np.prod([np.mean(np.abs(response[inside, i, i]) ** 2) for i in (0, 1)]))  # mean: an antiresonance is no coupling
         for i, j in ((0, 1), (1, 0)):
             power = float(np.mean(np.abs(response[inside, i, j]) ** 2) / own)
             noise = float(np.mean(sigma[inside, i, j] ** 2) / own)

@@ -22,7 +22,7 @@ Z95 = 1.959963984540054  # sigmas to each side of a 95 % interval: 97.5 % of the
 
 
 def _algebra(name: str) -> Callable[..., FrequencyResponse]:
-    """A method that calls a function of ``algebra``, imported on use because that module imports this one."""
+    """The function of ``algebra`` with this name, imported on use because that module imports this one."""
     found: Callable[..., FrequencyResponse] = getattr(importlib.import_module("xy_sysid.response.algebra"), name)
     return found
 

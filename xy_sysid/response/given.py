@@ -13,7 +13,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Origin
 
 FEWEST = 8  # lines; fewer do not determine a transfer function
-NEIGHBOURS = 7  # lines to which a parabola is fitted; the residual of the middle one is noise
+NEIGHBOURS = 7  # lines to which a parabola is fitted; their residual is the noise of the middle one
 KNOWN = 100.0  # number of averages assumed for a given sigma: it is known to 7 %
 SMALLEST = 1e-6  # of the response: numbers in files are not more accurate
 

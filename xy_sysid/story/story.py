@@ -147,7 +147,7 @@ def pruned(story: Story, run: Data, library: Library = STANDARD) -> Story:
 
 
 def tell(run: Data, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
-    """The full story of one axis: rigid model, diagnosis, and every needed effect. budget, clock: see ``diagnosis.of_run``."""
+    """The full story of one axis: diagnosis, its rigid model, and every needed effect. budget, clock: see ``diagnosis.of_run``."""
     found = diagnose(run, library, budget, clock)
     story = replace(_none(run, EPSILON), diagnosis=found.plain())
     return auto(_based(story, _data(story, run), found.base), run, library) if found.rungs else story
