@@ -116,8 +116,8 @@ def test_a_gain_that_one_recording_alone_shows_is_no_less_sure() -> None:
     begins = np.array([0, 25, 50, 75, 100, 125, 150, 175])
     one: Any = SimpleNamespace(scores=np.zeros(8))
     other: Any = SimpleNamespace(scores=np.array([0.1, -0.1, 0.1, -0.1, 9.0, 11.0, 10.0, 12.0]))
-    two: Any = SimpleNamespace(steps=[slice(0, 100), slice(100, 200)], held=SimpleNamespace(begins=begins))
-    alone: Any = SimpleNamespace(steps=[slice(0, 200)], held=SimpleNamespace(begins=begins))
+    two: Any = SimpleNamespace(steps=[slice(0, 100), slice(100, 200)], held_out=SimpleNamespace(begins=begins))
+    alone: Any = SimpleNamespace(steps=[slice(0, 200)], held_out=SimpleNamespace(begins=begins))
     both, pooled = gained(two, one, other), gained(alone, one, other)
     assert both.nats == pooled.nats == pytest.approx(42.0)
     assert both.error < 0.3 * pooled.error and both.is_sure and not pooled.is_sure

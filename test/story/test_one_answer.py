@@ -138,7 +138,7 @@ def test_backlash_that_could_not_be_looked_for_is_said(tmp_path: Path) -> None:
     kept[11_000:12_000] = False
     np.savez(tmp_path / "gap.npz", time=np.arange(voltage.size)[kept] / 2000.0, voltage=voltage[kept], position=position[kept])
     found = cli("diagnose", tmp_path / "gap.npz", "--json").json["axes"]["x"]
-    assert "backlash was not tried: that takes one stretch without a gap, and there are 2." in found["sentence"]
+    assert "Not tried: backlash, which needs one stretch without a gap (the data have 2)." in found["sentence"]
 
 
 def test_where_nothing_is_left_no_backlash_is_missed(command: dict[str, Any]) -> None:
