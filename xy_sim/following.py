@@ -1,6 +1,6 @@
 """The trajectory following of a JointTrajectoryController: from point to point by polynomials; the newest trajectory replaces others.
 
-Modelled on ros2_controllers, joint_trajectory_controller: what it refuses, what it skips, how it interpolates.
+It refuses, skips and interpolates as the joint_trajectory_controller of ros2_controllers does (its source was read).
 """
 
 from __future__ import annotations

@@ -21,6 +21,6 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def called(function: Callable[P, R]) -> Callable[P, R]:
-    """The same function, compiled once and called: for parts that few machines need, so that the kernel does not become slower."""
+    """Compile the function once, and call it instead of inlining it. Parts that few machines need then do not slow the kernel down."""
     compilable: Callable[P, R] = register_jitable(function)
     return compilable

@@ -21,6 +21,7 @@ from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.hypotheses.input_noise import input_noise
+from xy_sysid.hypotheses.one_step import one_step_names
 from xy_sysid.hypotheses.refusal import at_bound
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
@@ -70,10 +71,10 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     left = found.discrepancy / motion
     found, base, names = replace(found, tolerance=left, force=unmodelled_force(data, found.final)), found.base, found.best
     hidden_part = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
-    noise, untried = None, _untried(data, found, library)
+    noise = None
     if names and (found.explained >= 1.0 - found.explained or found.final.excess < AT_FLOOR):
         verdict: Kind = "missing_effect"
-        confidence, experiment = min(sure, 0.5) if _could_be(untried, names, library) else sure, words.experiment(names[0], library)
+        confidence, experiment = sure, words.experiment(names[0], library)
         sentence = words.missing(data, found, every[len(names) :], with_all)
     elif base.excess < AT_FLOOR or (noise := input_noise(data, base)) is not None:
         verdict, names, experiment = "nothing_missing", (), "None is needed."
@@ -88,7 +89,7 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
         found = replace(found, force=unmodelled_force(data, base))
         sentence = words.not_in_library(data, found)
     sentence += words.kept_out(found)
-    sentence += words.not_tried(untried, len(data.starts)) if verdict != "nothing_missing" else ""
+    sentence += words.not_tried(_untried(data, found, library), len(data.starts)) if verdict != "nothing_missing" else ""
     if found.stopped:
         sentence += " The search was stopped by its budget."
         confidence *= 0.8
@@ -126,7 +127,7 @@ def _untried(data: AxisData, found: Answer, library: Library) -> tuple[str, ...]
     """Effects that need one stretch without a gap, where the data have several stretches and the error is above the noise floor."""
     if len(data.starts) < 2 or found.final.excess < AT_FLOOR:
         return ()
-    return tuple(effect.name for effect in library.acting if effect.one_step is not None)
+    return one_step_names(library)
 
 
 def _could_be(untried: tuple[str, ...], names: tuple[str, ...], library: Library) -> bool:
@@ -158,7 +159,8 @@ def _confidence(data: AxisData, found: Answer, named: GreyboxFit) -> float:
     size = min((found.sizes[name] for name in names if name in found.sizes), default=0.0)
     likely = math.prod(likelihood(library, name, values) for name, values in found.final.model.effects if name in names)
     sure = (1.0 - doubt) * size / (size + 1.0) * likely
-    return min(sure, 0.5) if any(_undetermined(data, fit, name) for fit in (named, found.final) for name in names) else sure
+    doubtful = any(_undetermined(data, fit, name) for fit in (named, found.final) for name in names)
+    return min(sure, 0.5) if doubtful or _could_be(_untried(data, found, library), names, library) else sure
 
 
 def _undetermined(data: AxisData, fit: GreyboxFit, name: str) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.objective import Objective
+from xy_sysid.samples.block import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +28,15 @@ class UnmodelledForce:
     @property
     def mostly(self) -> tuple[float, float]:
         """(from, to) Hz: without the lowest tenth of its power and the highest fifth."""
-        share = np.cumsum([rms**2 for _, _, rms in self.bands]) / max(self.rms**2, 1e-300)
-        low, high = (min(int(np.searchsorted(share, at)), len(self.bands) - 1) for at in (0.1, 0.8))
-        return self.bands[low][0], self.bands[high][1]
+        low, high, rms = np.array(self.bands).T
+        return main_range(low, high, rms**2)
+
+
+def main_range(low: FloatArray, high: FloatArray, power: FloatArray) -> tuple[float, float]:
+    """(from, to) Hz of bands from low to high without the lowest tenth of their power and the highest fifth; the power is above 0."""
+    share = np.cumsum(power) / np.sum(power)
+    first, last = (min(int(np.searchsorted(share, at)), share.size - 1) for at in (0.1, 0.8))
+    return float(low[first]), float(high[last])
 
 
 def unmodelled_force(data: AxisData, fit: GreyboxFit) -> UnmodelledForce | None:

@@ -9,6 +9,7 @@ import numpy as np
 from xy_sysid.axis.model import Library
 from xy_sysid.diagnosis.answer import Answer, LookAlike, Tried
 from xy_sysid.diagnosis.equal_laws import equals, likelihood
+from xy_sysid.diagnosis.unmodelled import main_range
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import AT_FLOOR, DOUBTFUL
@@ -165,9 +166,8 @@ def _mostly(data: AxisData, fit: GreyboxFit) -> str:
     power = data.layout.lines * _beyond_noise(data, fit)
     if not float(power.sum()) > 0.0:
         return ""
-    edges, share = data.layout.edges(), np.cumsum(power) / power.sum()
-    low, high = (int(np.searchsorted(share, at)) for at in (0.1, 0.8))
-    return f", mostly between {edges[low]:.3g} and {edges[min(high + 1, edges.size - 1)]:.3g} Hz"
+    low, high = main_range(data.layout.edges()[:-1], data.layout.edges()[1:], power)
+    return f", mostly between {low:.3g} and {high:.3g} Hz"
 
 
 def _beyond_noise(data: AxisData, fit: GreyboxFit) -> FloatArray:

@@ -8,6 +8,7 @@ from math import exp
 
 import numpy as np
 
+from xy_sysid.axis.model import Library
 from xy_sysid.effects._contract import Limits
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import error_without
@@ -43,6 +44,11 @@ class OneStepResult:
         return size_ahead(min(self.bar, self.without), last.held_out_error, last.noise_floor)
 
 
+def one_step_names(library: Library) -> tuple[str, ...]:
+    """Effects that only one-step prediction can judge. It needs one stretch without a gap."""
+    return tuple(effect.name for effect in library.acting if effect.one_step is not None)
+
+
 @dataclass
 class OneStepTrials:
     """Each effect is fitted once from a set, and accepted if it beats the best simulation with an autoregressive error. found: the result."""
@@ -54,9 +60,8 @@ class OneStepTrials:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Effects to be tried; none for several recordings."""
-        one = len(self.pool.data.starts) == 1
-        return tuple(effect.name for effect in self.pool.library.acting if effect.one_step is not None and one)
+        """Effects to be tried; none for several stretches."""
+        return one_step_names(self.pool.library) if len(self.pool.data.starts) == 1 else ()
 
     def due(self, last: bool) -> bool:
         """Whether the best set leaves more error than it explains; checked after the first simulations and at the end of the search (last)."""

@@ -66,7 +66,7 @@ def meaningful(path: Path, recording: Recording) -> Recording:
 def without_dead_parts(recording: Recording) -> Recording:
     """Without long stretches in which an output does not change by a bit under an input as lively as elsewhere: they become gaps.
 
-    An output that rests long elsewhere, too, is of an axis that is held: a robot's joints move one after another.
+    If the output also rests long elsewhere, the axis is held, and its encoder works: the joints of a robot move one after another.
     """
     if len(recording) < ENOUGH:
         return recording
@@ -79,7 +79,7 @@ def without_dead_parts(recording: Recording) -> Recording:
             continue
         inside = np.zeros(len(y), dtype=np.bool_)
         inside[begin : begin + size] = True
-        if any(_rests(part, recording.sampling_rate) for part in (y[:begin], y[begin + size :])):
+        if any(_is_long(_longest_rest(part)[1], part, recording.sampling_rate) for part in (y[:begin], y[begin + size :]) if len(part)):
             continue
         lively = all(0.0 < float(np.std(values[part])) >= LIVELY * float(np.std(values[other])) for values, part, other in _compared(u, inside))
         if not lively or int(np.sum(~inside)) < ENOUGH:
@@ -100,9 +100,9 @@ def _compared(u: FloatArray, inside: NDArray[np.bool_]) -> list[tuple[FloatArray
     return [(u, inside, ~inside), (np.diff(u), *both)]
 
 
-def _rests(y: FloatArray, sampling_rate: float) -> bool:
-    """Whether an output stands long."""
-    return len(y) > 0 and _longest_rest(y)[1] > max(STUCK_SECONDS * sampling_rate, STUCK_PART * len(y))
+def _is_long(rest: int, y: FloatArray, sampling_rate: float) -> bool:
+    """Whether a rest of so many samples is long in time, and a large part of the output."""
+    return rest >= STUCK_SECONDS * sampling_rate and rest >= STUCK_PART * len(y)
 
 
 def _longest_rest(y: FloatArray) -> tuple[int, int]:
@@ -249,8 +249,7 @@ def _leaky(values: FloatArray, leak: float) -> FloatArray:
 def _stuck(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
     """The longest stretch over which the output does not change by a bit, although the input goes on."""
     begin, size = _longest_rest(y)
-    seconds = size / recording.sampling_rate
-    if seconds < STUCK_SECONDS or size < STUCK_PART * len(y):
+    if not _is_long(size, y, recording.sampling_rate):
         return []
     part = u[begin : begin + size]
     if float(np.std(part)) < 0.1 * float(np.std(u)) or float(np.std(part)) == 0.0:

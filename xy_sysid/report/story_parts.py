@@ -62,7 +62,7 @@ def nothing(sentence: str, mode: str) -> go.Figure:
 
 
 def floor_line(figure: go.Figure, at: int = 1, level: float = 1.0, label: str = "noise floor") -> None:
-    """A horizontal line at the noise floor of a log axis, labelled once at its left."""
+    """Draw a horizontal line at the noise floor of a logarithmic axis, with one label at its left end."""
     figure.add_hline(y=level, line={"color": FLOOR, "width": 1.5, "dash": "dot"}, row=at, col=1)
     figure.add_annotation(
         text=label, x=0, y=np.log10(level), xref="x domain", yref=_axis("y", at), xanchor="left", yanchor="bottom", showarrow=False,
