@@ -247,11 +247,11 @@ class World:
 
     def close(self) -> None:
         """End everything that was started."""
+        self._executor.shutdown()  # it calls what the node has, and must not outlive it
+        self.node.destroy_node()  # before the others are killed: Fast DDS crashes if one that shares memory with it dies just then
+        self.context.try_shutdown()
         for process in self.processes:
             process.end()
-        self._executor.shutdown()  # it calls what the node has, and must not outlive it
-        self.node.destroy_node()
-        self.context.try_shutdown()
 
 
 @contextmanager
