@@ -31,6 +31,7 @@ from xy_sysid.hypotheses import one_step
 from xy_sysid.hypotheses.companions import extended
 from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, SIZE
 from xy_sysid.imports import save
+from xy_sysid.samples.recording import Recording
 
 recorded = partial(simulated.recorded, block=100)
 
@@ -414,12 +415,26 @@ def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:
     assert [one.name for one in found.candidates].count("cogging") == 1 and found.candidates[0].name == "backlash"
 
 
-@pytest.mark.parametrize("effect", ["backlash", "presliding_hysteresis"])
-def test_what_was_not_tried_leaves_doubt_in_the_names_that_it_is_taken_for(effect: str) -> None:
-    """Backlash needs one stretch without a gap: of two stretches another effect is named, with 0.5 at most, and it is said; not so at the floor."""
+def with_gaps(effect: str, every: int, lost: int) -> Recording:
+    """20 s of an axis of which some samples are lost after every so many."""
     whole = recorded(effect, seconds=20.0)
-    keep = np.ones(len(whole), dtype=np.bool_)
-    keep[18_000:18_100] = False
-    found = of_run.diagnose(whole.only(keep))
-    assert ("Not tried: backlash, which needs one stretch without a gap (the data have 2)." in found.sentence) == (effect == "backlash")
-    assert found.confidence <= 0.5 if effect == "backlash" else found.effects == (effect,) and found.confidence > 0.9
+    return whole.only(np.arange(len(whole)) % (every + lost) < every)
+
+
+@pytest.mark.parametrize("effect", ["backlash", "presliding_hysteresis"])
+def test_what_needs_one_stretch_is_found_in_the_longest(effect: str) -> None:
+    """Backlash is predicted one sample ahead, which a gap would break: the answer is about the longest stretch, and says so."""
+    found = of_run.diagnose(with_gaps(effect, 22_000, 100))
+    alone = effect == "backlash"
+    assert found.effects == (effect,) and found.confidence > 0.9 and not found.untried
+    assert ("This is about the longest stretch alone, 11 s, as backlash needs one without a gap." in found.sentence) == alone
+    assert [run.seconds for run in found.runs] == ([11.0] if alone else [11.0, 8.95])
+    if alone:
+        assert found.final.parameter("backlash.gap").value == pytest.approx(EFFECTS["backlash"].parameters[0].typical, rel=0.1)
+
+
+def test_where_every_stretch_is_too_short_backlash_is_not_tried_and_leaves_doubt() -> None:
+    """Of stretches of 75 ms: an effect that backlash is mistaken for gets 0.5 at most, and it is said."""
+    found = of_run.diagnose(with_gaps("backlash", 150, 10))
+    assert found.untried == ("backlash",) and found.effects and found.confidence <= 0.5
+    assert "Not tried: backlash, which needs a longer stretch without a gap (the longest is 0.075 s)." in found.sentence

@@ -123,22 +123,44 @@ def test_one_move_tells_nothing_anywhere(tmp_path: Path) -> None:
     assert said["story"] is None and why in str(said)
 
 
-def test_a_gap_in_the_recording_is_no_place_for_backlash(rec: Path) -> None:
-    """A filter that predicts the next sample runs through one stretch: that is said in one line."""
-    assert "one, as a filter runs through it" in refused("refine", rec, "--add", "backlash")
-    with pytest.raises(BadInput, match="without a gap"):
-        desk = Desk(rec, Reading(), lambda news: None)
-        desk.do(Order(1, "add", "x", "backlash"))
-
-
-def test_backlash_that_could_not_be_looked_for_is_said(tmp_path: Path) -> None:
-    """Its filter runs through one stretch; where friction explains all, nothing was to be looked for."""
+@pytest.fixture(scope="module")
+def loose(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """12 s of an axis with backlash, of which half a second is lost."""
     voltage, position = recorded("backlash", seconds=12.0).axis("x")
     kept = np.ones(voltage.size, dtype=np.bool_)
-    kept[11_000:12_000] = False
-    np.savez(tmp_path / "gap.npz", time=np.arange(voltage.size)[kept] / 2000.0, voltage=voltage[kept], position=position[kept])
-    found = cli("diagnose", tmp_path / "gap.npz", "--json").json["axes"]["x"]
-    assert "Not tried: backlash, which needs one stretch without a gap (the data have 2)." in found["sentence"]
+    kept[10_000:11_000] = False
+    path = tmp_path_factory.mktemp("loose") / "loose.npz"
+    np.savez(path, time=np.arange(voltage.size)[kept] / 2000.0, voltage=voltage[kept], position=position[kept])
+    return path
+
+
+ALONE = "This is about the longest stretch alone, 6.5 s, as backlash needs one without a gap."
+
+
+def test_backlash_beside_a_gap_is_one_answer_too(loose: Path, tmp_path: Path) -> None:
+    """All are about the longest stretch, and say so; on the page the story is told again of that stretch."""
+    command = cli("diagnose", loose, "--json").json["axes"]["x"]
+    assert command["effects"] == ["backlash"] and ALONE in command["sentence"]
+    refined = cli("refine", loose, "--auto", "--json").json
+    assert refined["axes"]["x"]["effects"] == ["backlash"] and f"axis x: {ALONE}" in refined["notes"]
+    first, last = (of_page(loose, "begin", "diagnose", "auto")[k] for k in (0, -1))
+    assert says_the_same(last, command) and (first["seconds"], last["seconds"]) == (11.5, 6.5)
+    assert last["model"]["effects"] == ["backlash"] and last["explained"] and not first["explained"]
+    written = cli("report", loose, "-o", tmp_path / "loose.html", "--json").json["axes"]["x"]
+    assert written["story"]["sentence"] == command["sentence"] and written["story"]["ladder"] == last["ladder"]
+
+
+def test_backlash_that_is_asked_for_is_fitted_to_the_longest_stretch(loose: Path, rec: Path) -> None:
+    """By the command and on the page, where the effects that the model has are fitted to that stretch again."""
+    found = cli("refine", loose, "--add", "backlash", "--json").json
+    assert [rung["added"] for rung in found["axes"]["x"]["ladder"]] == [None, "backlash"] and f"axis x: {ALONE}" in found["notes"]
+    news: list[WorkerNews] = []
+    desk = Desk(rec, Reading(), news.append)
+    for number, name in enumerate(("coulomb_friction", "backlash")):
+        desk.do(Order(number, "add", "x", name))
+    story = [item.content for item in news if item.kind == "story"][-1]
+    assert [row["added"] for row in story["ladder"]] == [None, "coulomb_friction", "backlash"]
+    assert story["seconds"] == pytest.approx(12.25) and "longest stretch alone, 12.2 s, as backlash" in story["note"]
 
 
 def test_where_nothing_is_left_no_backlash_is_missed(command: dict[str, Any]) -> None:

@@ -51,6 +51,7 @@ def refine(
     from xy_sysid.diagnosis.answer import Rung
     from xy_sysid.diagnosis.of_run import refined
     from xy_sysid.diagnosis.refine import Effort
+    from xy_sysid.diagnosis.words import of_one_stretch
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library
     from xy_sysid.files.models import write_axis_mat, write_axis_models
@@ -89,6 +90,7 @@ def refine(
         write_axis_models(model, {name: item.final for name, item in found.items()}, origin)
     if mat is not None:
         write_axis_mat(mat, {name: item.final for name, item in found.items()})
+    alone_notes = [f"axis {name}:{said}" for name, item in found.items() if (said := of_one_stretch(item, item.runs[0].seconds))]
     if json:
         answers: dict[str, Any] = {
             name: _answer(item)
@@ -96,7 +98,7 @@ def refine(
             | {"mechanics": mechanics_document(item.final.parameters, recording.units, drive)}
             for name, item in found.items()
         }
-        emit({"recording": origin, "axes": answers, "refused": refused, "notes": notes_of(recordings, names)})
+        emit({"recording": origin, "axes": answers, "refused": refused, "notes": [*notes_of(recordings, names), *alone_notes]})
         return
     scale, unit = motion(recording.units.judged)
     for name, item in found.items():
@@ -112,7 +114,7 @@ def refine(
         if name in alone:
             say(f"  {_alone_in_words(alone[name], recording.output_unit)}")
         say()
-    for text in (text for one in recordings for text in one.left_out(names)):
+    for text in (*(text for one in recordings for text in one.left_out(names)), *alone_notes):
         say(text)
     say_refused(refused)
 

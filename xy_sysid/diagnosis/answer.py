@@ -174,6 +174,8 @@ class Answer:
     tolerance: part of the motion (rms) that is left unexplained beyond the noise
     where:    the places where the base fails; look_alikes: of the first effect; runs: that it is about
     force:    that nobody modelled: what the last rung leaves, or the base where no effect is named
+    untried:  effects that need one stretch without a gap, where the longest is too short for them
+    stretch:  the place of the stretch that the answer is about, if it is about one of several
     """
 
     rungs: tuple[Rung, ...]
@@ -200,6 +202,8 @@ class Answer:
     next_experiment: str = ""
     runs: tuple[Run, ...] = ()
     force: UnmodelledForce | None = None
+    untried: tuple[str, ...] = ()
+    stretch: int | None = None
 
     @property
     def effects(self) -> tuple[str, ...]:

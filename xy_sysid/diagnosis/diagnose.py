@@ -16,12 +16,11 @@ from xy_sysid.diagnosis.refine import Effort, never, refine
 from xy_sysid.diagnosis.sets import contains, part_explained
 from xy_sysid.diagnosis.unmodelled import unmodelled_force
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.greybox.axis_data import AxisData, one_stretch
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
 from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.hypotheses.input_noise import input_noise
-from xy_sysid.hypotheses.one_step import one_step_names
 from xy_sysid.hypotheses.refusal import at_bound
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
@@ -66,6 +65,7 @@ def not_enough(missing: str, units: Units = USUAL) -> Answer:
 
 def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     """The verdict on a search that has ended."""
+    data = data if found.stretch is None else one_stretch(data, found.stretch)
     every, with_all, (found, sure) = found.best, _confidence(data, found, found.final), _named(data, found)
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = found.discrepancy / motion
@@ -89,7 +89,9 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
         found = replace(found, force=unmodelled_force(data, base))
         sentence = words.not_in_library(data, found)
     sentence += words.kept_out(found)
-    sentence += words.not_tried(_untried(data, found, library), len(data.starts)) if verdict != "nothing_missing" else ""
+    seconds = max(run.stop - run.start for run in data.runs) / data.sampling_rate
+    sentence += words.not_tried(found.untried, seconds) if verdict != "nothing_missing" else ""
+    sentence += words.of_one_stretch(found, seconds)
     if found.stopped:
         sentence += " The search was stopped by its budget."
         confidence *= 0.8
@@ -123,13 +125,6 @@ def _named(data: AxisData, found: Answer) -> tuple[Answer, float]:
     return _cut_after(data, found, found.rungs.index(most)), _confidence(data, found, most.fit)
 
 
-def _untried(data: AxisData, found: Answer, library: Library) -> tuple[str, ...]:
-    """Effects that need one stretch without a gap, where the data have several stretches and the error is above the noise floor."""
-    if len(data.starts) < 2 or found.final.excess < AT_FLOOR:
-        return ()
-    return one_step_names(library)
-
-
 def _could_be(untried: tuple[str, ...], names: tuple[str, ...], library: Library) -> bool:
     """An effect that was not tried is often taken for one of those that are named."""
     return any(name in library[other].suspects for other in untried for name in names)
@@ -160,7 +155,7 @@ def _confidence(data: AxisData, found: Answer, named: GreyboxFit) -> float:
     likely = math.prod(likelihood(library, name, values) for name, values in found.final.model.effects if name in names)
     sure = (1.0 - doubt) * size / (size + 1.0) * likely
     doubtful = any(_undetermined(data, fit, name) for fit in (named, found.final) for name in names)
-    return min(sure, 0.5) if doubtful or _could_be(_untried(data, found, library), names, library) else sure
+    return min(sure, 0.5) if doubtful or _could_be(found.untried, names, library) else sure
 
 
 def _undetermined(data: AxisData, fit: GreyboxFit, name: str) -> bool:

@@ -14,6 +14,7 @@ from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.refine import Effort, never
 from xy_sysid.diagnosis.refine import refine as search
 from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import longest, one_stretch
 from xy_sysid.greybox.free_run import EPSILON
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
 from xy_sysid.hypotheses.enough_data import prepared
@@ -79,11 +80,15 @@ def refined(data: Data, names: tuple[str, ...], library: Library, effort: Effort
         ready = prepared(rate, signals, tolerance, units)
         if isinstance(ready, str):
             raise BadInput(f"data of axis {runs[0].axis}", "not enough", "what a model can be fitted to and judged by", ready)
-        return _about(runs, search(ready, library, names, effort))
+        if len(runs) == 1 or all(library[name].one_step is None for name in names):
+            return _about(runs, search(ready, library, names, effort))
+        place = longest(ready)
+        return _about(runs, replace(search(one_stretch(ready, place), library, names, effort), stretch=place))
 
 
 def _about(runs: tuple[Run, ...], found: Answer) -> Answer:
     """The answer with the runs that it is about; its models have the name of the axis and know the samples that they were fitted to."""
+    runs = runs if found.stretch is None else (runs[found.stretch],)
     digests = tuple(run.digest for run in runs)
     rungs = tuple(
         replace(rung, made=replace(rung.model, axis=runs[0].axis, data=digests, sampling_rate=runs[0].sampling_rate)) for rung in found.rungs

@@ -9,16 +9,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
+
+import numpy as np
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.rungs import answer_of_rungs, answer_of_search, rungs_of
-from xy_sysid.greybox.axis_data import AxisData
+from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import AxisData, longest, one_stretch
 from xy_sysid.greybox.free_run import GreyboxFit, joined
-from xy_sysid.hypotheses.criteria import MOST_EFFECTS, WORK, WORK_EACH, WORTH
-from xy_sysid.hypotheses.one_step import OneStepTrials
+from xy_sysid.greybox.whitened import enough
+from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, WORK, WORK_EACH, WORTH
+from xy_sysid.hypotheses.one_step import OneStepTrials, one_step_names
 from xy_sysid.hypotheses.pool import Pool
 from xy_sysid.jit import spent_compiling
 
@@ -69,7 +73,8 @@ def refine(
     pool.add_first(rungs[-1].fit)
     trials = OneStepTrials(pool)
     _search(pool, None if kept else trials, trying)
-    return answer_of_search(pool, rungs, trials.found)
+    found = answer_of_search(pool, rungs, trials.found)
+    return found if kept else _of_longest(data, found, library, replace(effort, budget=until - effort.now()), trying)
 
 
 def _search(pool: Pool, trials: OneStepTrials | None, trying: Callable[[frozenset[str]], None]) -> None:
@@ -89,6 +94,35 @@ def _search(pool: Pool, trials: OneStepTrials | None, trying: Callable[[frozense
     if trials is not None and trials.due(last=True):
         for tried in trials.tried(last=True):
             trying(tried)
+
+
+def _of_longest(data: AxisData, found: Answer, library: Library, effort: Effort, trying: Callable[[frozenset[str]], None]) -> Answer:
+    """The answer about several stretches, or about the longest alone if an effect is found in it that needs one stretch without a gap.
+
+    The best set of the search of all stretches is what one-step prediction has to beat.
+    """
+    names = one_step_names(library)
+    if len(data.starts) < 2 or found.final.excess < AT_FLOOR or not names:
+        return found
+    place = longest(data)
+    try:
+        alone = one_stretch(data, place)
+    except BadInput:
+        return replace(found, untried=names)
+    if alone.held_out is alone.fitted or not enough(np.arange(alone.velocity.size) >= alone.training):
+        return replace(found, untried=names)
+    rungs, until = rungs_of(alone, library), effort.now() + effort.budget
+    pool = Pool(alone, library, worth=effort.size, most=effort.most, late=lambda: effort.now() > until)
+    pool.add_first(rungs[-1].fit)
+    simulated = found.final.model.in_recording(place)
+    node = pool.with_screening_fit(frozenset(own for own, _ in simulated.effects), lambda: [simulated]) if simulated.effects else None
+    if node is not None:
+        pool.with_full_fit(node)
+    trials = OneStepTrials(pool)
+    if trials.due(last=True):
+        for names_tried in trials.tried(last=True):
+            trying(names_tried)
+    return found if trials.found is None else replace(answer_of_search(pool, rungs, trials.found), stretch=place)
 
 
 def settle(data: AxisData, now: GreyboxFit) -> GreyboxFit:

@@ -12,6 +12,7 @@ from xy_sysid.diagnosis.equal_laws import equals, likelihood
 from xy_sysid.diagnosis.unmodelled import main_range
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
+from xy_sysid.greybox.one_step import one_step_effect
 from xy_sysid.hypotheses.criteria import AT_FLOOR, DOUBTFUL
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import bare, moved
@@ -66,12 +67,20 @@ def kept_out(found: Answer) -> str:
     return f" {with_it}, but {'they are' if several else 'it is'} refused: {found.kept_out.refused}."
 
 
-def not_tried(names: tuple[str, ...], stretches: int) -> str:
-    """Says that effects were not tried, as the data have several stretches; empty if all effects were tried."""
+def not_tried(names: tuple[str, ...], longest: float) -> str:
+    """Says that effects were not tried, because the longest stretch is too short; empty if all effects were tried. longest: s."""
     if not names:
         return ""
     need = "needs" if len(names) == 1 else "need"
-    return f" Not tried: {listed(names)}, which {need} one stretch without a gap (the data have {stretches})."
+    return f" Not tried: {listed(names)}, which {need} a longer stretch without a gap (the longest is {longest:.3g} s)."
+
+
+def of_one_stretch(found: Answer, seconds: float) -> str:
+    """Says that the answer is about the longest stretch alone; empty if it is about all. seconds: of the longest stretch."""
+    needs = one_step_effect(found.final.model)
+    if found.stretch is None or needs is None:
+        return ""
+    return f" This is about the longest stretch alone, {seconds:.3g} s, as {needs.name} needs one without a gap."
 
 
 def experiment(name: str, library: Library) -> str:

@@ -220,6 +220,18 @@ def prepare_all(
     )
 
 
+def longest(data: AxisData) -> int:
+    """The place of the longest recording."""
+    sizes = [run.stop - run.start for run in data.runs]
+    return sizes.index(max(sizes))
+
+
+def one_stretch(data: AxisData, place: int) -> AxisData:
+    """One of several recordings alone. Raises BadInput if it is too short."""
+    run = data.runs[place]
+    return prepare(data.sampling_rate, data.voltage[run], data.position[run], data.floor.epsilon, data.units)
+
+
 def _early(whole: Windows, fitted: Windows, velocity: FloatArray, least: Floor, steps: Sequence[slice]) -> tuple[int, ...]:
     """Samples of each recording in the first stage: as many as it takes that what the whole excites is excited there (a sweep takes its time),
     and that a fit sees two windows."""

@@ -20,6 +20,7 @@ from xy_sysid.diagnosis.of_run import Data, diagnose, runs_together
 from xy_sysid.diagnosis.refine import Effort, never, refine, settle
 from xy_sysid.diagnosis.rungs import with_one_more
 from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import longest
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare_all
 from xy_sysid.greybox.one_step import one_step_effect, one_step_fit
 from xy_sysid.hypotheses.criteria import MOST_EFFECTS
@@ -37,7 +38,8 @@ class Story:
 
     rungs: the fits so far, the rigid base first; empty if the data do not suffice (``diagnosis`` then says what lacks); pictures: of each
     diagnosis: what is missing in the base, None before it was asked; tolerance: of the signal, in the noise floor
-    note: why the last action failed; empty if it succeeded
+    stretch: the place of the stretch that the story is about, if it is about one of several
+    note: why the last action failed, or what it left out; empty otherwise
     """
 
     axis: str
@@ -49,6 +51,7 @@ class Story:
     rungs: tuple[Rung, ...] = ()
     pictures: tuple[Pictures, ...] = ()
     diagnosis: Answer | None = None
+    stretch: int | None = None
     note: str = ""
 
     @property
@@ -77,7 +80,9 @@ def begin(run: Data, library: Library = STANDARD, tolerance: float = EPSILON) ->
 
 def diagnosed(story: Story, run: Data, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
     """The story with the diagnosis of the rigid model: the missing effect. The model is unchanged. budget, clock: see ``diagnosis.of_run``."""
-    return replace(story, diagnosis=diagnose(run, library, budget, clock, tolerance=story.tolerance).plain(), note="")
+    found = diagnose(run, library, budget, clock, tolerance=story.tolerance)
+    story = replace(_narrowed(story, run, library, found.stretch), note="")
+    return replace(story, diagnosis=found.plain())
 
 
 def added(story: Story, run: Data, name: str, library: Library = STANDARD) -> Story:
@@ -89,6 +94,9 @@ def added(story: Story, run: Data, name: str, library: Library = STANDARD) -> St
     if name in story.effects:
         raise BadInput("effect", repr(name), "one that is not in the model yet", f"It has {', '.join(story.effects)}.")
     data = _data(story, run)
+    if library[name].one_step is not None and len(data.starts) > 1:
+        alone = added(_narrowed(story, run, library, longest(data)), run, name, library)
+        return replace(alone, note=f"This is about the longest stretch alone, {alone.seconds:.3g} s, as {name} needs one without a gap.")
     planned = _planned(story)
     if planned is not None and planned.added == name:
         return _shown(story, data, planned, _fit_of(story, data, library, planned))
@@ -122,6 +130,8 @@ def next_best(story: Story, run: Data, library: Library = STANDARD) -> Story:
     if planned is not None:
         return _shown(story, data, planned, _fit_of(story, data, library, planned))
     found = refine(data, library, story.effects, Effort(most=MOST_EFFECTS - len(story.effects)))
+    story = _narrowed(story, run, library, found.stretch)
+    data = _data(story, run)
     new = [rung for rung in found.rungs if not {*rung.came} <= {*story.effects}]
     return _grown(story, data, new[0].fit, new[0].came) if new else replace(story, note=HELPS_NO_MORE)
 
@@ -149,7 +159,7 @@ def pruned(story: Story, run: Data, library: Library = STANDARD) -> Story:
 def tell(run: Data, library: Library = STANDARD, clock: Callable[[], float] = never, budget: float = math.inf) -> Story:
     """The full story of one axis: diagnosis, its rigid model, and every needed effect. budget, clock: see ``diagnosis.of_run``."""
     found = diagnose(run, library, budget, clock)
-    story = replace(_none(run, EPSILON), diagnosis=found.plain())
+    story = replace(_none(found.runs, EPSILON), diagnosis=found.plain(), stretch=found.stretch)
     return auto(_based(story, _data(story, run), found.base), run, library) if found.rungs else story
 
 
@@ -175,7 +185,23 @@ def _based(story: Story, data: AxisData, base: GreyboxFit) -> Story:
 
 
 def _data(story: Story, run: Data) -> AxisData:
-    return prepare_all(story.sampling_rate, [(one.voltage, one.position) for one in runs_together(run)], story.tolerance, story.units)
+    runs = runs_together(run)
+    runs = runs if story.stretch is None else (runs[story.stretch],)
+    return prepare_all(story.sampling_rate, [(one.voltage, one.position) for one in runs], story.tolerance, story.units)
+
+
+def _narrowed(story: Story, run: Data, library: Library, stretch: int | None) -> Story:
+    """The story told again of one stretch, with the same effects; the same story if it is about that stretch already, or if there is none."""
+    if stretch is None or story.stretch == stretch:
+        return story
+    told = begin(runs_together(run)[stretch], library, story.tolerance)
+    if not told.rungs:
+        lacking = told.diagnosis.sentence if told.diagnosis is not None else ""
+        raise BadInput("longest stretch without a gap", f"{told.seconds:.3g} s", "one that is long enough for a model", lacking)
+    told = replace(told, diagnosis=story.diagnosis, stretch=stretch)
+    for name in story.effects:
+        told = added(told, run, name, library)
+    return told
 
 
 def _planned(story: Story) -> Rung | None:
