@@ -29,7 +29,7 @@ from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.hypotheses import one_step
 from xy_sysid.hypotheses.companions import extended
-from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST
 from xy_sysid.imports import save
 from xy_sysid.samples.recording import Recording
 
@@ -317,7 +317,7 @@ def test_effects_come_in_the_order_of_what_each_would_cost() -> None:
     """By the best set known without it, so that there is an answer where the time left no fit without it, too."""
     data = prepare(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"))
     found, ticks = two_effects()
-    ladders = (found, refine(data, effort=Effort(budget=0.3 * ticks, clock=partial(next, count()), size=SIZE)))
+    ladders = (found, refine(data, effort=Effort(budget=0.3 * ticks, clock=partial(next, count()))))
     for ladder in ladders:
         assert ladder.effects and set(ladder.effects) == set(ladder.sizes)
         assert min(ladder.sizes.values()) > 0.0

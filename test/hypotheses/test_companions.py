@@ -12,7 +12,6 @@ from xy_sysid.effects._contract import Limits
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base
 from xy_sysid.hypotheses.companions import Demand, Extended, extended
-from xy_sysid.hypotheses.criteria import SIZE
 
 BAR = 5e-3  # m/s one sample ahead: more than what any filter with this gap leaves
 
@@ -25,7 +24,7 @@ def data() -> AxisData:
 
 def followed(data: AxisData, base: GreyboxFit, bar: float, masked: bool = False) -> Extended:
     """Backlash and what acts with it."""
-    return extended(data, base, STANDARD["backlash"], Demand(Limits(bar), SIZE, masked=masked))
+    return extended(data, base, STANDARD["backlash"], Demand(Limits(bar), masked=masked))
 
 
 def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(data: AxisData) -> None:

@@ -17,7 +17,7 @@ from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit, fit_base
 from xy_sysid.hypotheses.compare import gain, size
-from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS
 from xy_sysid.hypotheses.moves import is_twice, moves
 from xy_sysid.hypotheses.pool import Pool
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
@@ -30,7 +30,7 @@ def data_of(effect: str, seconds: float = 20.0) -> AxisData:
 
 def searched(data: AxisData, most: int = MOST_EFFECTS) -> tuple[Pool, list[frozenset[str]]]:
     """The pool after a search, and the sets that were said to be tried."""
-    pool = Pool(data, STANDARD, worth=SIZE, most=most)
+    pool = Pool(data, STANDARD, most=most)
     pool.add_first(fit_base(data))
     return pool, [*pool.search(), *pool.simplified()]
 
@@ -81,7 +81,7 @@ def test_no_set_has_more_effects_than_were_asked_for() -> None:
 def test_every_set_has_what_is_given() -> None:
     """And the effect that is missing beside it."""
     data = data_of("coulomb_friction+cogging")
-    pool = Pool(data, STANDARD, frozenset({"cogging"}), SIZE)
+    pool = Pool(data, STANDARD, frozenset({"cogging"}))
     base = fit_base(data)
     pool.add_first(with_one_more(data, STANDARD, base, base, "cogging"))
     assert all("cogging" in effects for effects in [*pool.search(), *pool.simplified()])
@@ -211,7 +211,7 @@ def test_a_quick_fit_tells_how_near_a_set_comes_by_the_first_set() -> None:
 def test_all_data_tell_whether_a_simpler_set_is_refused(refused_at_first: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A set is not kept because a quick fit of a simpler one is refused, and does not give way to one that all data refuse."""
     data, simple, crowded = data_of("coulomb_friction"), frozenset({"coulomb_friction"}), frozenset({"coulomb_friction", "constant_load"})
-    pool = Pool(data, STANDARD, worth=SIZE)
+    pool = Pool(data, STANDARD)
     pool.add_first(fit_base(data))
     rigid = pool.best.fit
     both = with_one_more(data, STANDARD, rigid, with_one_more(data, STANDARD, rigid, rigid, "coulomb_friction"), "constant_load")

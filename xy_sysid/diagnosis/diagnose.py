@@ -18,7 +18,7 @@ from xy_sysid.diagnosis.unmodelled import unmodelled_force
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, one_stretch
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.hypotheses.criteria import AT_FLOOR, SIZE
+from xy_sysid.hypotheses.criteria import AT_FLOOR
 from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.hypotheses.input_noise import input_noise
 from xy_sysid.hypotheses.refusal import at_bound
@@ -49,7 +49,7 @@ def diagnose_prepared(
     first: tuple[str, ...] = (),
 ) -> Answer:
     """Diagnose one axis from data that suffice. first: effects that are tried before all others (see ``first_set``)."""
-    effort = Effort(budget=budget, clock=clock, size=SIZE)
+    effort = Effort(budget=budget, clock=clock)
     begun = effort.now()
     found = answer_of_known_set(data, library, first, effort)
     if found is None:

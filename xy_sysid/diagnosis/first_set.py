@@ -34,7 +34,7 @@ def answer_of_known_set(data: AxisData, library: Library, names: tuple[str, ...]
         return effort.now() > until or data.work.done > enough
 
     base = rungs_of(data, library)
-    pool = Pool(data, library, worth=effort.size, most=effort.most, late=late)
+    pool = Pool(data, library, most=effort.most, late=late)
     pool.add_first(base[0].fit)
     trials = OneStepTrials(pool)
     _fitted(pool, tuple(name for name in names if library[name].one_step is None))

@@ -21,7 +21,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, longest, one_stretch
 from xy_sysid.greybox.free_run import GreyboxFit, joined
 from xy_sysid.greybox.whitened import enough
-from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, WORK, WORK_EACH, WORTH
+from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS, WORK, WORK_EACH
 from xy_sysid.hypotheses.one_step import OneStepTrials, one_step_names
 from xy_sysid.hypotheses.pool import Pool
 from xy_sysid.jit import spent_compiling
@@ -39,13 +39,11 @@ class Effort:
     most: effects, besides those given
     budget: s of processor time as ``clock`` tells it, after which it says the best it has; the time in which laws are compiled, once on a
         machine, does not count. Without one the search ends after a fixed amount of work, and the same data give the same answer
-    size: what an effect must explain to be added, over what is left unexplained, as powers
     """
 
     most: int = MOST_EFFECTS
     budget: float = math.inf
     clock: Callable[[], float] = never
-    size: float = WORTH
 
     def now(self) -> float:
         """s of the clock without what compiling took."""
@@ -69,7 +67,7 @@ def refine(
     def late() -> bool:
         return effort.now() > until or (effort.budget == math.inf and data.work.done > enough)
 
-    pool = Pool(data, library, frozenset(kept), worth=effort.size, most=effort.most, late=late)
+    pool = Pool(data, library, frozenset(kept), most=effort.most, late=late)
     pool.add_first(rungs[-1].fit)
     trials = OneStepTrials(pool)
     _search(pool, None if kept else trials, trying)
@@ -112,7 +110,7 @@ def _of_longest(data: AxisData, found: Answer, library: Library, effort: Effort,
     if alone.held_out is alone.fitted or not enough(np.arange(alone.velocity.size) >= alone.training):
         return replace(found, untried=names)
     rungs, until = rungs_of(alone, library), effort.now() + effort.budget
-    pool = Pool(alone, library, worth=effort.size, most=effort.most, late=lambda: effort.now() > until)
+    pool = Pool(alone, library, most=effort.most, late=lambda: effort.now() > until)
     pool.add_first(rungs[-1].fit)
     simulated = found.final.model.in_recording(place)
     node = pool.with_screening_fit(frozenset(own for own, _ in simulated.effects), lambda: [simulated]) if simulated.effects else None

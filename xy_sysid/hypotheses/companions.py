@@ -16,7 +16,7 @@ from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.innovation_test import traces
 from xy_sysid.greybox.one_step import AT_NOISE, Others, companions, error_without, filter_fit
 from xy_sysid.greybox.score_test import Trace
-from xy_sysid.hypotheses.criteria import ALIKE, AT_FLOOR, LEAST, MOST_EFFECTS, OPTIMISM_AHEAD, SIZE, WORTH
+from xy_sysid.hypotheses.criteria import ALIKE, AT_FLOOR, LEAST, MOST_EFFECTS, OPTIMISM_AHEAD, SIZE
 from xy_sysid.hypotheses.refusal import none_of
 
 
@@ -25,12 +25,11 @@ class Demand:
     """Requirements for a fit with one more effect.
 
     limits: when fits end; their bar is the error one sample ahead, m/s, of the best set without the gap: fits that cannot come near it end early
-    least: least size of an added effect; refused: why a fit does not count, or empty
+    refused: why a fit does not count, or empty
     masked: start with the effects that this one masks (``Effect.masks``)
     """
 
     limits: Limits = PATIENT
-    least: float = WORTH
     refused: Callable[[GreyboxFit], str] = lambda _: ""
     masked: bool = False
 
@@ -89,7 +88,7 @@ def _needed(data: AxisData, fit: GreyboxFit, found: FilterFit, effect: Effect, d
         if name in (effect.name, effect.start_friction) or demand.limits.late():
             continue
         less, its = filter_fit(data, replace(fit, model=fit.model.without(name)), effect, earlier=found, limits=demand.limits)
-        if _size(less, (fit.held_out_error / less.held_out_error) ** 2) < _least(name, effect, demand):
+        if _size(less, (fit.held_out_error / less.held_out_error) ** 2) < SIZE:
             fit, found = less, its
     return fit, found
 
@@ -108,7 +107,7 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: FilterFit, d
     known = {name for name, _ in companions(now.model, effect)[1]} | {name for name, _ in now.model.effects}
     open_to = [law for law in library.acting if distinguishable(law) and law.simulable and law.name not in known]
     seen = traces(data, now.model, effect, found, [*open_to, *_friction_with_load(effect, library, found)])
-    promising = [trace for trace in seen if _size(now, 1.0 - OPTIMISM_AHEAD * trace.share) >= _least(trace.effect, effect, demand)]
+    promising = [trace for trace in seen if _size(now, 1.0 - OPTIMISM_AHEAD * trace.share) >= SIZE]
     richer = _richer_friction(now, library, found)
     tried: list[_Tried] = []
 
@@ -130,7 +129,7 @@ def _better(data: AxisData, now: GreyboxFit, effect: Effect, found: FilterFit, d
     least = min((fit.held_out_error for _, fit, _ in tried), default=inf)
     alike = (item for item in tried if 2.0 * log(item[1].held_out_error / least) < LEAST)  # then the simplest
     best = min(alike, key=lambda item: (len(item[1].parameters), item[1].held_out_error), default=None)
-    worth = best is not None and _size(now, (best[1].held_out_error / now.held_out_error) ** 2) >= _least(best[0], effect, demand)
+    worth = best is not None and _size(now, (best[1].held_out_error / now.held_out_error) ** 2) >= SIZE
     return best if worth else None
 
 
@@ -147,11 +146,6 @@ def size_ahead(before: float, after: float, noise: float) -> float:
 def _size(now: GreyboxFit, part: float) -> float:
     """The same, if a given part of the error power of a fit remains."""
     return size_ahead(now.held_out_error, sqrt(max(part, 0.0)) * now.held_out_error, now.noise_floor)
-
-
-def _least(name: str, effect: Effect, demand: Demand) -> float:
-    """The least size of one more effect; larger for effects that imperfections of the contact imitate."""
-    return max(demand.least, SIZE) if name in effect.suspects else demand.least
 
 
 def add_companion(data: AxisData, now: GreyboxFit, effect: Effect, other: Effect) -> GreyboxFit:

@@ -16,7 +16,7 @@ from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, best_start, finish, first_excess, fit
 from xy_sysid.hypotheses import starts
 from xy_sysid.hypotheses.compare import force_explained, gain, size
-from xy_sysid.hypotheses.criteria import AT_FLOOR, HOPELESS, MOST_EFFECTS, NEAR, OPTIMISM, PRICE, WORTH
+from xy_sysid.hypotheses.criteria import AT_FLOOR, HOPELESS, MOST_EFFECTS, NEAR, OPTIMISM, PRICE, RICHER, SIZE
 from xy_sysid.hypotheses.moves import Move, count, moves
 from xy_sysid.hypotheses.refusal import refusal
 
@@ -49,7 +49,7 @@ class Node:
 
 @dataclass
 class Pool:
-    """The sets of one axis. worth: least size of an added effect; most: largest number of effects; late: time is up; kept: effects of every set.
+    """The sets of one axis. most: largest number of effects; late: time is up; kept: effects of every set.
 
     tried: (from, to) of the moves that were fitted
     """
@@ -57,7 +57,6 @@ class Pool:
     data: AxisData
     library: Library
     kept: frozenset[str] = frozenset()
-    worth: float = WORTH
     most: int = MOST_EFFECTS
     late: Callable[[], bool] = in_time
     nodes: dict[frozenset[str], Node] = field(default_factory=dict)
@@ -261,7 +260,7 @@ class Pool:
         """Whether the new effect is large enough if its gain is a few times its first-order prediction."""
         lines = max(node.fit.forced, 1.0) * self.data.held_out.begins.size
         most = OPTIMISM * 2.0 * self.scale * move.predicted_gain / lines
-        return move.parameters <= 0 or most >= len(move.effects - node.effects) * math.log1p(self.worth)
+        return move.parameters <= 0 or most >= len(move.effects - node.effects) * math.log1p(SIZE)
 
     def _try(self, parent: Node, move: Move) -> Node | None:
         """Fit the set of a move; a full fit only if it is near the best."""
@@ -302,13 +301,13 @@ class Pool:
     def _is_large(self, node: Node, simpler: Node) -> bool:
         """Better than a simpler set including the penalty for parameters, and by the least size of its effects.
 
-        A richer law in the place of a simpler one must have the size WORTH. Compared with a set at the floor nothing more is needed.
+        A richer law in the place of a simpler one must have the size RICHER. Compared with a set at the floor nothing more is needed.
         """
         one, other = comparable_fits(node, simpler)
         if other.excess < AT_FLOOR:
             return False
         new = len(node.effects) - len(simpler.effects)
-        least = (1.0 + self.worth) ** new - 1.0 if new > 0 else WORTH
+        least = (1.0 + SIZE) ** new - 1.0 if new > 0 else RICHER
         return gain(one, other).nats > PRICE * (node.parameters - simpler.parameters) and size(one, other) >= least
 
     def simplified(self) -> Iterator[frozenset[str]]:
