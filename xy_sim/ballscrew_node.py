@@ -1,8 +1,8 @@
 """The adapter around ``machine.Machine``: answers every voltage block with the positions at its samples' instants.
 
 It steps when a block arrives, so it runs in lockstep with the sender, in real time or many times faster. Without
-voltage, time stops, unless ``realtime`` is on: then the drive holds the last voltage until its ``watchdog``
-removes it (without one, permanently), the table moves on, and the encoder continues to report.
+voltage the simulation pauses, unless ``realtime`` is on: then the drive holds the last voltage for ``watchdog`` seconds
+(0: permanently), and the table continues to move and to report positions.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from xy_sysid.nodes.diagnostics import Diagnostics
 from xy_sysid.samples.block import Block
 from xy_sysid.settings import BallscrewSettings
 
-GO_ON = 0.005  # s between two checks whether the table must move on by itself
-LATE = 0.02  # s that a block may be late before the table moves on
+GO_ON = 0.005  # s between two checks whether the next block is late
+LATE = 0.02  # s that a block may be late before the table moves without it
 OTHER = 0.5  # s by which the time of counter 0 must differ to count as a restart of the voltage source
-IDLE = 0.1  # s without voltage after which the encoder reports by itself, with the motors off
+IDLE = 0.1  # s without voltage after which the status says that the motors are off
 
 
 class BallscrewNode(WalledNode):
-    """Voltage in, position out."""
+    """Receives voltage and publishes position."""
 
     def __init__(self) -> None:
         super().__init__("ballscrew")
@@ -40,7 +40,7 @@ class BallscrewNode(WalledNode):
         self._machine.step(np.zeros((1, len(self._machine.axes))))  # compile in advance
         self._machine.reset()
         self._next: int | None = None
-        self._until = 0.0  # when the last block is over, s by the steady clock
+        self._until = 0.0  # steady time at which the last block ends, s
         self._heard = time.monotonic()
         self._epoch = 0.0  # s, time of the sample with counter 0, from the voltage stream
         self._faults: dict[str, int] = {}
@@ -76,7 +76,7 @@ class BallscrewNode(WalledNode):
 
     def _answer(self, block: Block) -> None:
         if self._own.settings.realtime and self._next is not None and block.seq[0] < self._next <= block.seq[-1]:
-            late = int(self._next - block.seq[0])  # the table has moved on in the meantime
+            late = int(self._next - block.seq[0])  # the table has moved without them in the meantime
             self._fault("late", f"{late} samples of voltage came after their time")
             block = Block(block.axes, block.seq[late:], block.time[late:], block.values[late:])
         first = int(block.seq[0])
@@ -97,7 +97,7 @@ class BallscrewNode(WalledNode):
         self._position.publish(to_message(Block(self._machine.axes, block.seq, block.time, positions)))
 
     def _go_on(self) -> None:
-        """The time since the last block is over and no other came: hold the voltage, or 0 V once the watchdog has seen it."""
+        """If the next block is late, simulate the time that has passed, with the last voltage or, after the watchdog time, with 0 V."""
         now, rate = time.monotonic(), self._machine.rate
         if self._next is None or now < self._until + LATE:
             return

@@ -1,10 +1,10 @@
 """A substitute for a robot with ros2_control: joint_state_broadcaster and a forward controller around a simulated machine.
 
-Same topics, types, quality of service and order of things as a controller manager: each period of the steady clock it reads the
-joints (position, and the effort of the period before), publishes ``joint_states`` with the ROS time of the reading, takes the newest
-command whose size fits, and writes an effort. A velocity or position command goes through a loop of its own, as in a drive. The machine
-moves by the clock: a cycle that comes late is left out, and finds the machine where the last effort has brought it meanwhile. Like a
-controller manager it asks for real-time priority, and goes on without where that is not allowed.
+Topics, types, quality of service and sequence are those of a controller manager: in each period of the steady clock it reads the
+joints (position, and the effort of the previous period), publishes ``joint_states`` with the ROS time of the reading, takes the newest
+command of the right size, and writes an effort. A velocity or position command is the reference of a control loop in this node, as in
+a drive. The machine moves in real time: a period that is missed is skipped, and the last effort acts during it. Like a controller
+manager, the node requests real-time priority, and runs without it where that is not allowed.
 
     python -m xy_sim.controller_node --ros-args -p machine:=joint.yaml -p joints:="[shoulder-pan]" -p interface:=position
 """
@@ -32,11 +32,11 @@ from xy_sysid.nodes.run import run_node
 from xy_sysid.samples.block import FloatArray
 
 INTERFACES = ("effort", "velocity", "position")
-PRIORITY = 50  # of SCHED_FIFO, as ros2_control_node asks for
+PRIORITY = 50  # of SCHED_FIFO, as ros2_control_node requests
 
 
 class ControllerNode(Node):
-    """Commands in, joint states out, by a clock of its own."""
+    """Receives commands and publishes joint states at a fixed rate."""
 
     exit_code: int | None = None
 
@@ -48,9 +48,9 @@ class ControllerNode(Node):
         machine = with_effects(Machine(replace(machine.spec, rate=rate)), effects)
         joints = [str(name) for name in self.declare_parameter("joints", [""]).value or [] if name] or list(machine.axes)
         self._interface = str(self.declare_parameter("interface", "effort").value)
-        self._stiffness = float(self.declare_parameter("stiffness", 15.0).value or 0.0)  # effort a rad, of the position loop
-        self._damping = float(self.declare_parameter("damping", 0.3).value or 0.0)  # effort a rad/s, of both loops
-        self._integral = float(self.declare_parameter("integral", 10.0).value or 0.0)  # effort a rad, of the velocity loop
+        self._stiffness = float(self.declare_parameter("stiffness", 15.0).value or 0.0)  # effort per rad, of the position loop
+        self._damping = float(self.declare_parameter("damping", 0.3).value or 0.0)  # effort per rad/s, of both loops
+        self._integral = float(self.declare_parameter("integral", 10.0).value or 0.0)  # effort per rad, of the velocity loop
         self._load = float(self.declare_parameter("load", 0.0).value or 0.0)  # rms of an unmeasured load, in effort
         if self._interface not in INTERFACES:
             raise BadInput("interface", repr(self._interface), ", ".join(INTERFACES), "Choose one of these.")
@@ -166,7 +166,7 @@ def in_real_time() -> bool:
 
 
 def main() -> int:
-    """The process."""
+    """Run the node; returns the exit code of the process."""
     return run_node(ControllerNode)
 
 

@@ -39,7 +39,7 @@ class Couplings(Settings):
 
 
 class Coupled:
-    """The motion of two axes as their encoders see it, from block to block."""
+    """The encoder readings of two coupled axes; keeps the state of the base between blocks."""
 
     def __init__(self, what: Couplings, drives: Sequence[Drive], rate: float) -> None:
         """drives: of the two axes; rate: samples per second, Hz."""
@@ -57,7 +57,7 @@ class Coupled:
         return [1.0, 0.0, 0.0], [1.0, 2.0 * self._damping * self._omega, self._omega**2]
 
     def seen(self, motion: FloatArray) -> FloatArray:
-        """(n, 2) encoder readings for the (n, 2) motion of the axes."""
+        """(n, 2) encoder readings for the (n, 2) motion of the axes, m."""
         one, other = motion[:, 0], motion[:, 1]  # summed by hand: a matrix product rounds differently for other lengths
         swings, self._state = scipy.signal.lfilter(
             self._numerator, self._denominator, one * self._pushes[0] + other * self._pushes[1], zi=self._state
@@ -66,6 +66,6 @@ class Coupled:
         return np.column_stack(read)
 
     def mixing(self, frequency: FloatArray) -> NDArray[np.complex128]:
-        """(n, 2, 2) reading of encoder i over the motion of axis j, at these frequencies, Hz."""
+        """(n, 2, 2) transfer from the motion of axis j to the reading of encoder i, at (n,) Hz."""
         _, swings = scipy.signal.freqs(*self._swing, worN=2.0 * np.pi * np.asarray(frequency))
         return np.asarray(self._frame + swings[:, None, None] * np.outer(self._along, self._pushes))

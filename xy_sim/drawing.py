@@ -17,7 +17,7 @@ _STREAM = 20_260  # separates these random numbers from the encoder's, which use
 
 
 def drawn(spec: Spec, seed: int | None) -> Spec:
-    """The spec with the drawn parts of the file's ``hidden`` group; the file's seed by default."""
+    """The spec with parts drawn as the file's ``hidden`` group says, by default from its seed."""
     group = dict(spec.hidden or {})
     chosen = int(group.get("seed", 1)) if seed is None else seed
     return with_drawn(spec, chosen, group.get("effects", "1..2"), float(group.get("scale", 1.0)))
@@ -35,7 +35,7 @@ def with_drawn(spec: Spec, seed: int, effects: Effects, scale: float) -> Spec:
 
 
 def sizes(part: Part, random: np.random.Generator, scale: float = 1.0) -> dict[str, float]:
-    """Every parameter of a part, drawn from its range; scale: of the effect's size, by each parameter's ``power``."""
+    """Every parameter of a part, drawn from its range and multiplied by scale^``power``; scale: relative size of the effect."""
     powers = [(1.0 if place == 0 else 0.0) if item.power is None else item.power for place, item in enumerate(part.parameters)]
     return {item.name: _size(item, random, scale**power) for item, power in zip(part.parameters, powers, strict=True)}
 
@@ -61,7 +61,7 @@ def _asked(effects: Effects) -> tuple[int, int, str]:
 
 
 def _choose(axis: Axis, group: str, count: int, random: np.random.Generator) -> list[Part]:
-    """``count`` parts that the axis does not have, none of which replaces another of its family."""
+    """Up to ``count`` parts of the group that the axis does not have, at most one per family."""
     chosen: list[Part] = []
     taken = {PARTS[name].family for name in axis.parts}
     for name in random.permutation(sorted(name for name, part in PARTS.items() if part.drawn)):

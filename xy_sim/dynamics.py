@@ -1,7 +1,7 @@
 """Newton's law of one axis: from state and voltage to the state's rate of change.
 
 Coordinates: motor and table relative to the base, the base in space, a rattling mass relative to the base. Forces that
-parts give in volts of the drive are turned to newtons by ``force_per_volt``.
+parts give in volts of the drive are converted to newtons by ``force_per_volt``.
 """
 
 from __future__ import annotations
@@ -81,14 +81,14 @@ def breakaway(p: FloatArray, t: float, direction: float, dirt: FloatArray | None
 
 @inlined
 def slide_length(p: FloatArray, v: float) -> float:
-    """Bristle deflection that speed ``v`` can hold, m."""
+    """Steady bristle deflection when sliding at speed ``v``, m."""
     length: float = p[_PRE_LENGTH] * dry_level(p, v, 1.0 if v >= 0.0 else -1.0) / p[_PRE]
     return length
 
 
 @inlined
 def longest_step(p: FloatArray, v: float, step: float) -> float:
-    """The inner step (s), shortened where speed ``v`` bends the bristles faster."""
+    """The inner step (s), shortened if the bristles deflect too fast for it at speed ``v``."""
     if p[_PRE] == 0.0:
         return step
     return min(step, presliding_hysteresis.longest_step(v, slide_length(p, v)))
@@ -110,12 +110,12 @@ def regime(p: FloatArray, y: FloatArray, i: int) -> int:
 
 @inlined
 def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: int, o: int, dirt: FloatArray | None = None) -> float:
-    """Writes the derivative of row ``i`` of ``y`` into its row ``o``; returns the force (N) that keeps the motor where it is.
+    """Writes the derivative of row ``i`` of ``y`` into its row ``o``; returns the force (N) to be balanced to hold the motor at rest.
 
-    p: parameters (layout.numbers); y: (rows, layout.STATES), SI; t: time, s; volts: what arrives at the amplifier, V;
-    dirt: p again if there is dirt, else None: what is only for dirt is then not even compiled;
-    mode: FREE, or the direction of sliding (-1, +1), or 0 when the motor sticks. Friction that can hold the returned
-    force keeps a resting motor at rest.
+    p: parameters (layout.numbers); y: (rows, layout.STATES), SI; t: time, s; volts: input of the amplifier, V;
+    dirt: p again if the machine has imperfections, else None (their code is then not compiled);
+    mode: FREE, or the direction of sliding (-1, +1), or 0 when the motor sticks. A motor at rest stays at rest while the
+    friction can balance the returned force.
     """
     k = p[_FORCE]
     coupled = p[_COUPLED] != 0.0
@@ -206,7 +206,7 @@ def _accelerations(
     on_loose: float,
     dirt: FloatArray | None,
 ) -> float:
-    """Solves the masses for their accelerations; the base feels the reaction of whatever slides on it."""
+    """Computes the accelerations of all masses; the reaction of the masses on the base acts on it."""
     rotor, table, base = p[_ROTOR], p[_TABLE], p[_BASE_MASS]
     of_base = 0.0
     if p[_COUPLED] != 0.0:

@@ -1,4 +1,4 @@
-"""Effects as a user types them: ``[axis:]name[=size][,parameter=value]...``."""
+"""Effects in a command line: ``[axis:]name[=size][,parameter=value]...``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from xy_sysid.settings import unknown_name
 
 
 def parse(text: str) -> tuple[str | None, str, dict[str, str]]:
-    """Axis (None is every axis), part and its given parameters; raises BadInput with the nearest spelling.
+    """Axis (None is every axis), name of the part and the given parameters; raises BadInput with the nearest spelling.
 
     >>> parse("x:stribeck_friction=0.3,velocity=0.02")
     ('x', 'stribeck_friction', {'excess': '0.3', 'velocity': '0.02'})

@@ -1,6 +1,6 @@
-"""The trajectory following of a JointTrajectoryController: from point to point by polynomials; the newest trajectory replaces others.
+"""The reference of a JointTrajectoryController: polynomials between the points; a new trajectory replaces the present one.
 
-It refuses, skips and interpolates as the joint_trajectory_controller of ros2_controllers does (its source was read).
+Checks, skipped points and interpolation follow the source of joint_trajectory_controller in ros2_controllers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point of a trajectory: s from its start, positions (joints,), and their derivatives or empty arrays."""
+    """A point of a trajectory: time from its start, s; (joints,) positions, rad; their first and second derivatives, or empty arrays."""
 
     at: float
     position: FloatArray
@@ -27,14 +27,14 @@ class Following:
     """``take`` reads a trajectory, ``now`` returns the reference of the joints."""
 
     def __init__(self, joints: Sequence[str]) -> None:
-        """joints: in the order of the controller."""
+        """joints: names in the order of the controller."""
         self._joints = tuple(joints)
         self._points: list[Point] = []
         self._times = np.empty(0)
         self._begins = 0.0
 
     def take(self, names: Sequence[str], points: Sequence[Point], begins: float, now: float, state: Point) -> str:
-        """Replace the trajectory; returns why it is refused, or an empty text. begins: s, 0 is now; state: (joints,) present positions."""
+        """Replace the trajectory; returns the reason for a refusal, or an empty text. begins: start time, s, 0 is now; state: of the joints now."""
         if sorted(names) != sorted(self._joints):
             return f"joints on incoming trajectory ({', '.join(names)}) don't match the controller joints ({', '.join(self._joints)})"
         times = np.array([point.at for point in points])
@@ -53,7 +53,7 @@ class Following:
         return ""
 
     def now(self, now: float) -> tuple[FloatArray, FloatArray] | None:
-        """(joints,) reference position and speed; None before the first trajectory."""
+        """(joints,) reference position, rad, and speed, rad/s, at time ``now``, s; None before the first trajectory."""
         if not self._points:
             return None
         since = now - self._begins
@@ -65,7 +65,7 @@ class Following:
 
 
 def _between(one: Point, other: Point, since: float) -> tuple[FloatArray, FloatArray]:
-    """Polynomial interpolation of order 5, 3 or 1, from the derivatives that both ends have."""
+    """Position and speed ``since`` (s) after point one, by a polynomial of order 5, 3 or 1: the derivatives that both points have."""
     known = 1 + int(one.speed.size > 0 and other.speed.size > 0)
     known += int(known == 2 and one.push.size > 0 and other.push.size > 0)
     length = other.at - one.at

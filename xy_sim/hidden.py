@@ -17,7 +17,7 @@ def hidden(seed: int, clean: bool = False) -> Machine:
 def draw(seed: int, effects: Effects = (1, 3), machine: str | Path = "rigid.yaml", scale: float = 1.0, clean: bool = False) -> Machine:
     """A machine with effects drawn for each axis.
 
-    effects: how many to each axis, or (fewest, most), or "1..3", or "none", or "outside" for one part that no hypothesis knows;
-    machine: what they are added to; scale: multiplies their sizes. Raises BadInput.
+    effects: number per axis, or (fewest, most), or "1..3", or "none", or "outside" for one part that is not among the hypotheses;
+    machine: file of the machine without them; scale: multiplies their sizes. Raises BadInput for a wrong file or number of effects.
     """
     return Machine(with_drawn(read(machine), seed, effects, scale), seed, clean)

@@ -1,4 +1,4 @@
-"""The imperfections ("dirt") in one call, which machines without them never make.
+"""The imperfections ("dirt") of a machine; the kernel of a machine without any does not call this file.
 
 The laws are in the parts; this file combines them.
 """
@@ -28,7 +28,7 @@ _LATE, _LATE_SEED = slot("late_drive.largest"), slot("late_drive.seed")
 
 @inlined
 def gain_and_drag(p: FloatArray, t: float, q: float) -> tuple[float, float]:
-    """Force per volt and drag, each relative to its mean, at ``t`` (s) and ``q`` (m)."""
+    """Force per volt and drag, each relative to its nominal value, at ``t`` (s) and ``q`` (m)."""
     gain, drag = 1.0, 1.0
     if p[_WANDER] != 0.0:
         gain = curve.around_one(p, _WANDER_CURVE, p[_WANDER], t / p[_WANDER_TIME])
@@ -43,13 +43,13 @@ def gain_and_drag(p: FloatArray, t: float, q: float) -> tuple[float, float]:
 
 @inlined
 def hum(p: FloatArray, t: float) -> float:
-    """Disturbance in volts at ``t`` (s)."""
+    """Mains hum at ``t`` (s), V."""
     return mains_hum.volts(p[_RIPPLE], p[_RECTIFIED], p[_MAINS], p[_MAINS_PHASE], t) if p[_MAINS] != 0.0 else 0.0
 
 
 @inlined
 def friction(p: FloatArray, t: float) -> float:
-    """Total friction relative to its mean, at ``t`` (s)."""
+    """Total friction relative to its nominal value, at ``t`` (s)."""
     return curve.around_one(p, _RUB_CURVE, p[_RUB], t / p[_RUB_TIME]) if p[_RUB] != 0.0 else 1.0
 
 
@@ -80,7 +80,7 @@ def modes(p: FloatArray, y: FloatArray, i: int, x: float, v: float, o: int) -> f
 
 @inlined
 def on_a_moving_base(p: FloatArray, y: FloatArray, o: int, of_base: float) -> None:
-    """Convert the weak modes' rates to a base that accelerates by ``of_base`` (m/s2)."""
+    """Correct the weak modes' rates in row ``o`` of ``y`` for the acceleration ``of_base`` of the base, m/s2."""
     if p[_MASS] > 0.0:
         y[o, WEAK_SPEED] -= of_base
     if p[_MASS2] > 0.0:

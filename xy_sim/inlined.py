@@ -15,12 +15,12 @@ R = TypeVar("R")
 
 
 def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """The same function, callable from Python and from compiled code; inlining by force makes the kernel a quarter faster."""
+    """The same function, callable from Python and from compiled code; forced inlining makes the kernel a quarter faster."""
     compilable: Callable[P, R] = register_jitable(forceinline=True)(function)
     return compilable
 
 
 def called(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile the function once, and call it instead of inlining it. Parts that few machines need then do not slow the kernel down."""
+    """Compile the function without inlining, so that parts that few machines need do not slow the kernel down."""
     compilable: Callable[P, R] = register_jitable(function)
     return compilable

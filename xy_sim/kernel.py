@@ -2,7 +2,7 @@
 
 Between two switching instants of the delayed voltage the step is a fixed fraction of them, so a delay of any fraction
 of a sample is exact. Classical Runge-Kutta of order 4 in smooth motion. A step in which a contact or the direction of
-dry friction changes is halved until the change is located within 1/4096 of it. ``first_order_steps`` replaces all of this.
+dry friction changes is halved until the change is located within 1/4096 of it. The part ``first_order_steps`` integrates without all this.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Run = Callable[[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, FloatA
 
 ROWS = 7
 _NOW, _NEXT, _BETWEEN, _K1, _K2, _K3, _K4 = range(ROWS)  # rows of the state table
-_EVENT = 1.0 / 4096.0  # of a step: accuracy of an event's time; 6 ns of 25 us
+_EVENT = 1.0 / 4096.0  # accuracy of an event's time, as a fraction of a step: 6 ns of 25 us
 _DRY, _COUPLED, _ON_TABLE = slot("dry"), slot("coupled"), slot("encoder_on_table")
 _COARSE, _PRE = slot("first_order_steps.step"), slot("presliding_hysteresis.coulomb")
 _PLACES = (MOTOR, BASE, TABLE, RATTLE, WEAK, SECOND_WEAK)  # each is followed by its speed
@@ -124,7 +124,7 @@ def _piece(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts: f
 
 @inlined
 def _uncommon(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts: float, mode: int, inner: float, dirt: FloatArray | None) -> int:
-    """As ``_piece``, with the step method of the machine file."""
+    """As ``_piece``, but with first-order steps if the machine has the part ``first_order_steps``."""
     if p[_COARSE] == 0.0:
         return _piece(p, y, n, t, span, volts, mode, inner, dirt)
     steps = max(math.ceil(span * inner - 1e-9), 1)
@@ -137,12 +137,12 @@ def _uncommon(p: FloatArray, y: FloatArray, n: int, t: float, span: float, volts
 def _uncommon_sample(
     p: FloatArray, y: FloatArray, n: int, past: FloatArray, sample: int, mode: int, rate: float, inner: float, dirt: FloatArray | None
 ) -> int:
-    """Advance row NOW by a sample with early or late voltages, or with coarse steps; returns the friction mode."""
+    """Advance row NOW by one sample with early or late voltages, or with first-order steps; returns the friction mode."""
     period, size = 1.0 / rate, past.shape[0]
     whole, _ = time_delay.samples(p[_DELAY], rate)
     begun, volts = 0.0, 0.0
     last = min(sample - whole + 1, sample)
-    for arriving in range(sample - whole - 2, last + 2):  # nothing arrives more than half a sample early or late
+    for arriving in range(sample - whole - 2, last + 2):  # no voltage arrives more than half a sample early or late
         ending = period
         if arriving <= last:
             ending = min((arriving - sample) * period + imperfections.late(p, p[_DELAY], period, arriving), period)
@@ -154,7 +154,7 @@ def _uncommon_sample(
 
 
 def _build(_text: int) -> Run:
-    """The compiled loop; ``_text`` identifies the program text, so that a changed part is never run from a stale cache."""
+    """The compiled loop; ``_text`` is the checksum of the program text, so that a changed part is never run from an old cache."""
 
     @compiled
     def run(
@@ -168,10 +168,10 @@ def _build(_text: int) -> Run:
         inner: float,
         dirt: FloatArray | None,
     ) -> None:
-        """Steps one axis over all of ``u`` (V) and writes what the encoder's disk shows before each into ``out`` (m).
+        """Simulates one axis over all samples of ``u`` (n,), V, and writes the position before each, without noise, into ``out`` (n,), m.
 
-        y: (ROWS, states), the state in row 0; past: ring of voltages on their way; counters: sample number, friction mode;
-        rate, inner: samples and inner steps per second, Hz; dirt: p again if there is dirt, else None.
+        y: (ROWS, states), the state in row 0; past: ring buffer of delayed voltages, V; counters: (3,) sample number, friction mode,
+        checksum; rate, inner: samples and inner steps per second, Hz; dirt: p again if there are imperfections, else None.
         y, past and counters are changed.
         """
         counters[2] = _text

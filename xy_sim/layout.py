@@ -1,6 +1,6 @@
-"""One axis as a row of numbers: where each parameter and each state lies.
+"""One axis as a vector of numbers: the index of each parameter and each state.
 
-Absent parts are rows of zeros, so every combination of parts runs in the same compiled kernel.
+Parameters of absent parts are zero, so every combination of parts runs in the same compiled kernel.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _SLOTS = {name: place for place, name in enumerate(_NAMES)}
 
 
 def slot(name: str) -> int:
-    """Place of a number: a drive constant, or ``part.parameter``."""
+    """Index of a number in ``numbers``: a constant of the drive, or ``part.parameter``; raises KeyError for another name."""
     return _SLOTS[name]
 
 
@@ -65,7 +65,7 @@ def numbers(drive: Drive, parts: Mapping[str, Mapping[str, float]]) -> FloatArra
 
 
 def coupling(drive: Drive, parts: Mapping[str, Mapping[str, float]]) -> tuple[float, float]:
-    """Stiffness (N/m) and dashpot (N s/m) between motor and table; zeros when they are one body."""
+    """Stiffness (N/m) and damping (N s/m) between motor and table; zeros if they are one body."""
     if "screw_compliance" in parts:
         values = parts["screw_compliance"]
         stiffness = screw.stiffness(values["frequency"], drive.table_mass)

@@ -1,4 +1,4 @@
-"""The simulated machine: volts in, encoder metres out."""
+"""The simulated machine: from voltages to encoder positions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _RESOLVED = 1.5  # rad in one inner step: the method of order 4 is stable to 2.6
 
 
 class _Moving:
-    """One axis while it runs: parameters, state, voltages on their way, and its own noise."""
+    """One axis while it runs: parameters, state, delayed voltages, and its own noise."""
 
     def __init__(self, axis: Axis, rate: float, seed: int, number: int) -> None:
         self.parameters = numbers(axis.drive, axis.parts)
@@ -36,13 +36,13 @@ class _Moving:
 
 
 class Machine:
-    """A table of one or more axes that goes on from where it was; its truth can be asked for.
+    """A table of one or more axes that keeps its state from step to step; ``truth`` returns its true parameters.
 
     Any split of the same voltages into blocks gives the same positions, bit for bit.
     """
 
     def __init__(self, spec: Spec, seed: int | None = None, clean: bool = False) -> None:
-        """spec: what it is made of; seed: of the encoder noise (the spec's by default); clean: exact positions."""
+        """seed: of the encoder noise (the spec's by default); clean: exact positions. Raises BadInput if inner_rate is too small."""
         self.spec = spec
         self.seed = spec.seed if seed is None else seed
         self.clean = clean
@@ -54,9 +54,9 @@ class Machine:
 
     @classmethod
     def from_file(cls, path_or_name: str | Path, seed: int | None = None, clean: bool = False) -> Machine:
-        """A machine from a YAML file or a name in config/machines; a file with ``hidden`` draws its effects from the seed.
+        """A machine from a YAML file or a name in config/machines; the effects of a file with ``hidden`` are drawn from the seed.
 
-        Raises BadInput for what cannot be read, with the nearest spelling of an unknown name.
+        Raises BadInput for a missing or wrong file, with the nearest spelling of an unknown name.
         """
         spec = read(path_or_name)
         if spec.hidden is not None:
@@ -75,17 +75,17 @@ class Machine:
 
     @property
     def samples(self) -> int:
-        """Samples done since the start."""
+        """Samples since the start."""
         return int(self._moving[0].counters[0])
 
     def reset(self) -> None:
-        """Back to rest at the origin, with the noise from its start."""
+        """Set the machine to rest at the origin, at sample 0, and start its noise again."""
         self._moving = [_Moving(axis, self.spec.rate, self.seed, number) for number, axis in enumerate(self.spec.axes)]
         drives = [axis.drive for axis in self.spec.axes]
         self._coupled = Coupled(self.spec.coupling, drives, self.spec.rate) if self.spec.coupling.any else None
 
     def step(self, voltage: FloatArray) -> FloatArray:
-        """(n, axes) encoder positions, m: row k is read at the instant at which row k of ``voltage`` (n, axes), V, begins to be held."""
+        """(n, axes) encoder positions, m: row k is read when row k of ``voltage`` (n, axes), V, is output. Raises BadInput for another shape."""
         given = np.asarray(voltage, dtype=np.float64)
         if given.ndim != 2 or given.shape[1] != len(self._moving) or not np.all(np.isfinite(given)):
             raise BadInput("voltage", f"of shape {given.shape}", f"finite numbers, (n, {len(self._moving)})", "Give one column per axis.")
@@ -112,7 +112,7 @@ class Machine:
         return out
 
     def mixing(self, frequency: FloatArray) -> NDArray[np.complex128]:
-        """(n, axes, axes) what the encoder of axis i reads, over the motion of axis j alone, at (n,) Hz: the truth of coupling."""
+        """(n, axes, axes) true transfer from the motion of axis j to the reading of encoder i, at (n,) Hz."""
         if self._coupled is not None:
             return self._coupled.mixing(frequency)
         return np.tile(np.eye(len(self.axes), dtype=np.complex128), (len(frequency), 1, 1))
@@ -130,22 +130,24 @@ class Machine:
         return counted
 
     def truth(self, axis: str, time: float = 0.0) -> dict[str, Any]:
-        """The linear truth of an axis at small signal, at ``time`` (s) for what drifts; see ``xy_sim.truth.linear``."""
+        """The true linear model of an axis at small signal, with its drifts at ``time``, s; see ``xy_sim.truth.linear``."""
         return truth.linear(self.spec.axes[self._place(axis)], time)
 
     def state(self, axis: str) -> dict[str, float]:
-        """Every state of an axis now, by name, SI."""
+        """The present states of an axis, by name, SI."""
         return dict(zip(STATES, self._moving[self._place(axis)].states[0].tolist(), strict=True))
 
     def energy(self, axis: str) -> float:
-        """Energy stored in an axis now, J: motion, springs, contacts, bristles, potentials."""
+        """Energy stored in an axis at present, J: motion, springs, contacts, bristles, potentials."""
         moving = self._moving[self._place(axis)]
         return truth.energy(moving.parameters, moving.states[0], self.samples / self.rate)
 
     def with_parts(self, parts: Mapping[str, Any], axes: Sequence[str] | None = None) -> Machine:
         """A new machine at rest, with parts added or replaced on some axes (all by default).
 
-        parts: name -> size, or name -> {parameter: value}, or name -> {} for the default size, or name -> False to take it away.
+        parts: name -> size, or name -> {parameter: value}, or name -> {} for the default size, or name -> False to remove it.
+
+        Raises BadInput for an unknown name or a value outside its range.
         """
         for axis in axes or ():
             self._place(axis)

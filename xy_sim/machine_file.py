@@ -1,4 +1,4 @@
-"""Machine files: YAML in, checked settings out."""
+"""Reads and checks machine files (YAML)."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Spec:
-    """A whole machine, before it moves.
+    """The description of a machine.
 
     rate: samples per second, Hz; inner_rate: fewest inner steps per second, Hz; seed: of the encoder noise;
-    unit: of positions, m or rad; masses are inertias then
-    hidden: what ``xy_sim.drawing`` shall draw (keys seed, effects, scale), or empty
-    coupling: what its two axes do to each other
+    unit: of positions, m or rad (masses are then inertias)
+    hidden: the effects that ``xy_sim.drawing`` draws (keys seed, effects, scale), or None
+    coupling: of its two axes
     """
 
     axes: tuple[Axis, ...]
@@ -98,7 +98,7 @@ def _number(value: object, where: str, low: float, high: float) -> float:
 
 
 def parts_from(given: object, where: str) -> dict[str, dict[str, float]]:
-    """Checked parts with all their parameters, from part -> size, or part -> parameter -> value, or part -> nothing."""
+    """Parts with all parameters, from part -> size, or part -> parameter -> value, or part -> nothing; raises BadInput for wrong ones."""
     table = _mapping(given, f"{where}: parts")
     for name in table:
         if name not in PARTS:
@@ -107,14 +107,14 @@ def parts_from(given: object, where: str) -> dict[str, dict[str, float]]:
 
 
 def fitting(axis: Axis) -> Axis:
-    """The same axis; raises BadInput if one of its parts needs another that is not there."""
+    """The same axis; raises BadInput if it has base_loosening without base_resonance."""
     if "base_loosening" in axis.parts and "base_resonance" not in axis.parts:
         raise BadInput(f"axis {axis.name}: part", "base_loosening", "only on a base that can swing", "Add base_resonance.")
     return axis
 
 
 def _numeric(values: dict[str, Any]) -> dict[str, Any]:
-    """YAML 1.1 takes 1e-6 for text; here it is a number."""
+    """Numbers such as 1e-6, which YAML 1.1 reads as text."""
 
     def number(value: Any) -> Any:
         try:
@@ -136,7 +136,7 @@ def _axis(name: str, given: object, where: str) -> Axis:
 
 
 def _table(name: str | Path, beside: Path | None = None, depth: int = 0) -> tuple[str, dict[str, Any]]:
-    """File name and top-level keys, with those of ``base`` below them; axes and parts are merged by name."""
+    """File name and top-level keys; missing ones come from ``base``, and axes and parts are merged by name."""
     near = None if beside is None else beside / str(name)
     path = near if near is not None and near.is_file() else machine_path(name)
     if depth > 8:
@@ -162,7 +162,7 @@ def _table(name: str | Path, beside: Path | None = None, depth: int = 0) -> tupl
 
 
 def read(name: str | Path) -> Spec:
-    """The machine that a file describes; raises BadInput, which names the value, what is allowed and the nearest spelling."""
+    """The machine of a file; raises BadInput, which names the wrong value and either the allowed values or the nearest spelling."""
     file, table = _table(name)
     hidden = _mapping(table["hidden"], f"{file}: hidden") if "hidden" in table else None
     for key in hidden or {}:

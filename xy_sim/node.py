@@ -1,4 +1,4 @@
-"""Executable ``ballscrew``: the simulated XY table as a node. Voltage blocks in, encoder positions out."""
+"""Executable ``ballscrew``: the simulated XY table as a node, from voltage blocks to encoder positions."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""A stand-in for a robot that takes only trajectories: a JointTrajectoryController over a position loop around a simulated machine.
+"""A substitute for a robot that accepts only trajectories: a JointTrajectoryController and a position loop around a simulated machine.
 
-As ``controller_node`` with the interface position, but for its topic and what it follows.
+As ``controller_node`` with the interface position, except for the topic and the reference.
 
     python -m xy_sim.trajectory_node --ros-args -p joints:="[shoulder_pan_joint]" -p update_rate:=200.0
 """
@@ -20,7 +20,7 @@ from xy_sysid.samples.block import FloatArray
 
 
 class TrajectoryNode(ControllerNode):
-    """Trajectories in, joint states out, by a clock of its own."""
+    """Receives trajectories and publishes joint states at a fixed rate."""
 
     def __init__(self) -> None:
         self._following: Following | None = None
@@ -56,7 +56,7 @@ class TrajectoryNode(ControllerNode):
         return float(self.get_clock().now().nanoseconds * 1e-9)
 
     def _update(self, command: FloatArray | None, speed: FloatArray) -> FloatArray:
-        """The effort that takes the joints along the trajectory."""
+        """(joints,) effort of the loop that follows the trajectory; zeros before the first trajectory."""
         wanted = self._following.now(self._time()) if self._following is not None else None
         if wanted is None:
             return np.zeros(len(self._joints))
@@ -64,7 +64,7 @@ class TrajectoryNode(ControllerNode):
 
 
 def main() -> int:
-    """The process."""
+    """Run the node; returns the exit code of the process."""
     return run_node(TrajectoryNode)
 
 

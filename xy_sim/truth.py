@@ -1,7 +1,7 @@
-"""What is true of an axis: its linear transfer function at small signal, and the energy it holds.
+"""The true linear transfer function of an axis at small signal, and its stored energy.
 
-The transfer function is derived from the mass, damping and stiffness matrices, not from the kernel that simulates, so
-that each proves the other.
+The transfer function is derived from the mass, damping and stiffness matrices, not from the simulating kernel, so that
+each checks the other.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def _determinant(matrix: list[list[_Poly]]) -> _Poly:
 
 
 def _trim(poly: _Poly, scale: float) -> _Poly:
-    """Without leading coefficients that are zero but for rounding; ``scale`` is a frequency of the system, rad/s."""
+    """The polynomial without leading coefficients that are zero within rounding; ``scale`` is a frequency of the system, rad/s."""
     size = np.abs(poly) * scale ** np.arange(poly.size - 1, -1, -1, dtype=np.float64)
     kept = poly.copy()
     kept[size < 1e-13 * size.max()] = 0.0
@@ -53,7 +53,7 @@ def _trim(poly: _Poly, scale: float) -> _Poly:
 
 
 def _matrices(axis: Axis, time: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Mass, damping, stiffness over the coordinates that move at small signal, and the map from all six to them.
+    """Mass, damping and stiffness matrices of the n coordinates that move at small signal, and the (6, n) map from them to all six.
 
     All six: motor and table relative to the base, base in space, rattling mass and the two weak modes relative to the base.
     """
@@ -137,15 +137,15 @@ def _pairs(roots: NDArray[np.complex128]) -> list[float]:
 
 
 def fastest(axis: Axis) -> float:
-    """Largest magnitude of the poles, rad/s: what the inner step must resolve."""
+    """Largest magnitude of the poles, rad/s, which the inner step must resolve."""
     return float(np.abs(np.roots(_transfer(axis, 0.0)[1])).max())
 
 
 def linear(axis: Axis, time: float = 0.0) -> dict[str, Any]:
-    """The truth that an identification should find, JSON-ready, SI.
+    """The true model that an identification should find, JSON-ready, SI.
 
-    Dry friction, gaps (closed), dead zone, saturation and what repeats along the travel are left out; what drifts is
-    taken at ``time``. velocity_gain is None if a spring holds the axis. pole is the real pole next to the drive's.
+    Without dry friction, dead zone, saturation and effects that repeat along the travel; backlash counts as closed, and drifts
+    are taken at ``time``, s. velocity_gain is None if a spring holds the axis. pole is the real pole nearest to the drive's.
     """
     numerator, denominator = _transfer(axis, time)
     zeros, poles = np.roots(numerator).astype(np.complex128), np.roots(denominator).astype(np.complex128)
@@ -178,7 +178,7 @@ def linear(axis: Axis, time: float = 0.0) -> dict[str, Any]:
 
 
 def energy(p: FloatArray, y: FloatArray, time: float) -> float:
-    """Energy stored in one axis, J. p: layout.numbers; y: state; work of a constant load counts as potential."""
+    """Energy stored in one axis at ``time`` (s), J. p: layout.numbers; y: state; the work of a constant load counts as potential."""
 
     def get(name: str) -> float:
         return float(p[slot(name)])

@@ -7,7 +7,7 @@ import pkgutil
 
 from xy_sim.parts.contract import Part
 
-_TOOLS = ("chance", "contact", "contract", "curve")  # what several parts share
+_TOOLS = ("chance", "contact", "contract", "curve")  # shared by several parts
 
 
 def _found() -> dict[str, Part]:

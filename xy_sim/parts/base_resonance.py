@@ -25,7 +25,7 @@ PART = Part(
 
 @inlined
 def stiffness(moving: float, frequency: float) -> float:
-    """k, N/m, for the mass that moves when the screw is locked, kg."""
+    """k, N/m; moving: mass that moves with the screw locked, kg."""
     omega = 2.0 * math.pi * frequency
     return moving * omega * omega
 

@@ -1,6 +1,6 @@
-"""A random number for every sample, that depends on nothing but a seed and the sample's number, so that blocks do not matter.
+"""A random number for every sample, which depends only on a seed and the sample's number, not on the division into blocks.
 
-Law: two rounds of multiply and shift (C. Wellons, Prospecting for hash functions, 2018) over 32 bits.
+Law: three rounds of shift and multiply over 32 bits (after C. Wellons, Prospecting for hash functions, 2018).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ _WORD = 0xFFFFFFFF
 
 @inlined
 def centred(seed: float, number: int) -> float:
-    """Between -1 and 1, uniform."""
+    """Uniform between -1 and 1."""
     word = (int(seed) * 7_919 + number + 1) & _WORD
     for _ in range(3):
         word = ((word ^ (word >> 16)) * 0x45D9F3B) & _WORD

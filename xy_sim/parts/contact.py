@@ -1,6 +1,6 @@
-"""Two bodies that touch: the law that end stops, backlash and loose joints share.
+"""Contact of two bodies: the law of end stops, backlash and loose masses.
 
-Law: f = k d (1 + c d'), never pulling; d is how far they press into one another.
+Law: f = k d (1 + c d'), but never below 0; d is the depth of indentation.
 Source: K. H. Hunt, F. R. E. Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42 (1975).
 """
 
@@ -11,7 +11,7 @@ from xy_sim.inlined import inlined
 
 @inlined
 def force(x: float, v: float, half_gap: float, stiffness: float, damping: float) -> float:
-    """Force in the direction of ``x`` that a body at ``x`` (m), moving at ``v`` (m/s), exerts on what lies beyond +-half_gap, N."""
+    """Force in the direction of ``x`` that a body at ``x`` (m), moving at ``v`` (m/s), exerts on a stop at +-half_gap, N."""
     if x > half_gap:
         return max(stiffness * (x - half_gap) * (1.0 + damping * v), 0.0)
     if x < -half_gap:
@@ -21,7 +21,7 @@ def force(x: float, v: float, half_gap: float, stiffness: float, damping: float)
 
 @inlined
 def regime(x: float, v: float, half_gap: float, damping: float) -> int:
-    """Which branch of the law holds: 0 free, 1 and 2 pressing on either side, 3 and 4 parting too fast to press."""
+    """The branch of the law: 0 free, 1 and 2 in contact on either side, 3 and 4 separating too fast for a force."""
     if x > half_gap:
         return 1 if 1.0 + damping * v > 0.0 else 3
     if x < -half_gap:

@@ -15,11 +15,11 @@ Group = Literal["base", "effect", "added", "outside", "event", "imperfection"]
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number of a part: ``low..high`` is drawn from, ``minimum..maximum`` is allowed.
+    """One number of a part: drawn from ``low..high``, allowed in ``minimum..maximum``.
 
     signed: drawn with either sign; whole: drawn as a whole number
-    power:  how it goes with the size of the effect: 1 for the first parameter of a part and 0 for the others unless given;
-            negative where the effect shrinks while the number grows
+    power:  exponent by which it scales with the size of the effect, by default 1 for the first parameter of a part and 0 for
+            the others; negative if a larger number is a smaller effect
     """
 
     name: str
@@ -35,7 +35,7 @@ class Parameter:
     power: float | None = None
 
     def checked(self, value: object, where: str) -> float:
-        """The value as a number; raises BadInput outside the allowed range."""
+        """The value as a number; raises BadInput for text or a value outside the allowed range."""
         allowed = f"{self.minimum:g} to {self.maximum:g} {self.unit}".rstrip()
         try:
             number = float(str(value))
@@ -51,14 +51,14 @@ class Part:
     """One physical effect of the machine.
 
     law:        the equation, in the symbols of the parameters
-    meaning:    what it is on a real table
-    source:     where the law comes from
+    meaning:    its cause on a real table
+    source:     literature of the law
     parameters: the first one is its size, the number of ``--effect NAME=SIZE``
-    kind:       where it acts; group: who may suspect it ("outside": no hypothesis knows it; "event": happens meanwhile;
-                "added": known, but not drawn;
-                "imperfection": dirt that every real machine has a little of, and that has no law to be found)
-    family:     parts of one family replace one another when effects are drawn
-    drawn:      False for a part that came later: seeds keep the machines that they have always drawn
+    kind:       where it acts
+    group:      "effect": can be drawn; "outside": can be drawn, but no hypothesis describes it; "base", "added": not drawn;
+                "event": a change during the run; "imperfection": small irregularities of every real machine, without a law to identify
+    family:     at most one part of a family is drawn
+    drawn:      False keeps a newer part out of the draw, so that each seed still gives the same machine
     """
 
     name: str
@@ -72,7 +72,7 @@ class Part:
     drawn: bool = True
 
     def values(self, given: object, where: str) -> dict[str, float]:
-        """Every parameter from what a user gave: nothing (defaults), one number (the size), or names and numbers."""
+        """Every parameter, from nothing (defaults), one number (the size), or names and numbers; raises BadInput for wrong ones."""
         if given is None or given is True:
             given = {}
         if not isinstance(given, Mapping):

@@ -1,4 +1,4 @@
-"""A smooth random curve: what varies along a travel or meanwhile, without a period or a law that anybody could guess.
+"""A smooth random curve: a variation along the travel or in time, without a visible period or law.
 
 Law: cubic B-spline through KNOTS random heights, one unit apart, periodic; mean 0 and rms 1 over all of it.
 Source: de Boor, A Practical Guide to Splines, rev. ed. 2001, ch. IX (uniform cubic B-spline).
@@ -13,7 +13,7 @@ import numpy as np
 from xy_sim.inlined import inlined
 from xy_sysid.samples.block import FloatArray
 
-KNOTS = 64  # a power of two; the machine moves over few of them, so nothing repeats
+KNOTS = 64  # a power of two; a motion covers only a few of them, so the curve does not repeat
 
 
 def heights(seed: int) -> FloatArray:
@@ -39,5 +39,5 @@ def value(p: FloatArray, first: int, place: float) -> float:
 
 @inlined
 def around_one(p: FloatArray, first: int, depth: float, place: float) -> float:
-    """Something over its mean, where the curve times ``depth`` is its relative change; never below a tenth."""
+    """A factor around 1: 1 plus ``depth`` times the curve at ``place`` (knots), at least 0.1."""
     return max(1.0 + depth * value(p, first, place), 0.1)

@@ -18,5 +18,5 @@ PART = Part(
 
 @inlined
 def output(width: float, u: float) -> float:
-    """What is left of the voltage ``u``, V."""
+    """The output voltage for the voltage ``u``, V."""
     return u - min(max(u, -width), width)

@@ -23,5 +23,5 @@ PART = Part(
 
 @inlined
 def lateness(largest: float, seed: float, sample: int) -> float:
-    """By how much the voltage of sample number ``sample`` is late, s."""
+    """Timing error of the voltage of sample number ``sample``, s; positive is late."""
     return largest * chance.centred(seed, sample)

@@ -24,5 +24,5 @@ PART = Part(
 
 @inlined
 def reading(amplitude: float, wavenumber: float, phase: float, q: float) -> float:
-    """What the encoder sees at ``q`` (m), m; wavenumber in rad/m."""
+    """Reading of the encoder at ``q`` (m), m; wavenumber in rad/m."""
     return q + amplitude * (math.sin(wavenumber * q + phase) - math.sin(phase)) if amplitude != 0.0 else q

@@ -26,6 +26,6 @@ PART = Part(
 
 @inlined
 def volts(ripple: float, rectified: float, mains: float, phase: float, t: float) -> float:
-    """What is added at ``t`` (s), V."""
+    """The added voltage at ``t`` (s), V."""
     a = 2.0 * math.pi * mains * t + phase
     return ripple * math.sin(a) + rectified * math.sin(2.0 * a + 1.0)

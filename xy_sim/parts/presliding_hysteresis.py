@@ -23,11 +23,11 @@ PART = Part(
 
 @inlined
 def rate(z: float, v: float, slide: float) -> float:
-    """z', m/s, where ``slide`` is the deflection (m) that this speed can hold."""
+    """z', m/s; slide: steady deflection when sliding at this speed, m."""
     return v - abs(v) * z / slide
 
 
 @inlined
 def longest_step(v: float, slide: float) -> float:
-    """Inner step that still resolves the bristles at speed ``v``, s: 0.25 of their relaxation length."""
+    """Longest inner step that resolves the bristles at speed ``v``, s: a quarter of their relaxation time."""
     return 0.25 * slide / (abs(v) + 1e-9)

@@ -23,5 +23,5 @@ PART = Part(
 
 @inlined
 def shift(largest: float, seed: float, v: float, sample: int) -> float:
-    """What sample number ``sample`` reads too much at speed ``v`` (m/s), m."""
+    """Error of the reading of sample number ``sample`` at speed ``v`` (m/s), m."""
     return v * largest * chance.centred(seed, sample)

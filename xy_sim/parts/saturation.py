@@ -5,7 +5,7 @@ from __future__ import annotations
 from xy_sim.inlined import inlined
 from xy_sim.parts.contract import Parameter, Part
 
-# What the usual 1 V rms of noise loses at 1.6 V, as rms, is ten times of what it loses at 1.8 times as much: hence the power.
+# Of noise of 1 V rms, a limit of 1.6 V cuts off roughly ten times as much (rms) as one of 2.9 V: this gives the power.
 PART = Part(
     name="saturation",
     kind="input",
@@ -19,5 +19,5 @@ PART = Part(
 
 @inlined
 def output(limit: float, u: float) -> float:
-    """Clipped voltage, V; limit 0 is none."""
+    """Clipped voltage, V; limit 0 is no limit."""
     return min(max(u, -limit), limit) if limit > 0.0 else u

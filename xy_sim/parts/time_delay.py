@@ -18,7 +18,7 @@ PART = Part(
 
 @inlined
 def samples(delay: float, rate: float) -> tuple[int, float]:
-    """Whole sample periods of a delay (s) at ``rate`` (Hz), and what is left, s."""
+    """Whole sample periods of a delay (s) at ``rate`` (Hz), and the remainder, s."""
     whole = int(delay * rate + 1e-9)
     rest = delay - whole / rate
     return whole, rest if rest > 1e-12 else 0.0

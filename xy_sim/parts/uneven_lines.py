@@ -29,7 +29,7 @@ PART = Part(
 
 @inlined
 def error(p: FloatArray, first: int, fine: float, wave: float, period: float, length: float, q: float) -> float:
-    """What the encoder reads too much at ``q`` (m), m; the curve begins at ``first`` of ``p``."""
+    """Error of the encoder reading at ``q`` (m), m; the curve begins at ``first`` of ``p``."""
     a = 2.0 * math.pi * q / period
     short = fine * (math.sin(a) + 0.5 * (math.sin(2.0 * a + 1.0) - math.sin(1.0)))
     return short + wave * (curve.value(p, first, q / length) - curve.value(p, first, 0.0))

@@ -28,7 +28,7 @@ UNCERTAIN, HOLD, CALCULATION = "uncertainty of the parameters", "sampling and ho
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The cost of a part of the axis. phase: its phase lag at the crossover, degrees; without: Hz, crossover of a loop without it (NaN: unknown)."""
+    """The cost of a part of the axis. phase: phase lag at the crossover, degrees; without: Hz, crossover of a loop without it (NaN: none)."""
 
     part: str
     phase: float
@@ -37,14 +37,14 @@ class Cost:
 
 @dataclass(frozen=True, slots=True)
 class Bandwidth:
-    """crossover: Hz, the highest with the margins; costs: of each part, the largest first."""
+    """crossover: Hz, the highest that keeps the margins; costs: of each part, the largest first."""
 
     crossover: float
     costs: tuple[Cost, ...]
 
 
 def bandwidth_of(model: PhysicalModel, sampling_rate: float, at: float, asked: Asked = USUAL, calculation: float = 0.0) -> Bandwidth:
-    """The highest crossover with the margins, and the cost of each part.
+    """The highest crossover that keeps the margins, and the cost of each part.
 
     at: Hz, the crossover at which phases are counted; calculation: s, delay of the controller, which is added to that of the model
 

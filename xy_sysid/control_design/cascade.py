@@ -39,7 +39,7 @@ class Cascade:
 
 
 def cascade(model: PhysicalModel, asked: Asked = USUAL, calculation: float = 1.0) -> Cascade:
-    """The gains of the largest (or requested) crossover whose margins hold for every sample of the parameters, including the estimator.
+    """The gains of the largest (or requested) crossover whose margins, with the estimator, hold for every sample of the parameters.
 
     calculation: cycles from reading to writing. Raises BadInput as ``feedback`` does.
     """
@@ -55,7 +55,7 @@ def cascade(model: PhysicalModel, asked: Asked = USUAL, calculation: float = 1.0
 
 
 def shaped(system: Sampled, crossover: float) -> tuple[float, float, float]:
-    """Gains of the cascade whose loop with this system is 1 at the crossover, rad/s."""
+    """Gains of the cascade whose loop gain with this system is 1 at the crossover, rad/s."""
     position, integral, at = crossover / POSITION, crossover / INTEGRAL, np.array([crossover / TURN])
     loop = system.response(at) * response_of(*system_of(position, 1.0, integral), at, RATE)
     size = math.copysign(1.0 / abs(complex(loop[0])), sign_of(system))

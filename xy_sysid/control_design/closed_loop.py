@@ -28,7 +28,7 @@ class Controller:
 
     kp: V/m; ki: V/m/s; kd: V s/m; derivative_time: s, of the first-order low-pass on de/dt (0: none)
     sections: (k, 5) second-order sections b0, b1, b2, a1, a2 that the feedback's voltage passes
-    limit: V; the integral is held while the voltage is clipped and the error would increase it (clamping)
+    limit: V; the integral is held while the voltage is clipped and the error would drive it further (clamping)
     """
 
     kp: float
@@ -60,7 +60,7 @@ class Encoder:
 class Tracked:
     """The motion of a simulated axis.
 
-    position: (n,) reading of the encoder without noise, m; shown: (n,) with noise; voltage: (n,) V; error: (n,) path - position
+    position: (n,) encoder reading without noise and counts, m; shown: (n,) with both; voltage: (n,) V; error: (n,) path - position, m
     carried: (n,) true position of the load, m: without the scale's error, and behind the backlash if there is one
     """
 
@@ -123,7 +123,7 @@ def _loop_of(library: Library) -> Callable[..., None]:
 def follow_path(
     model: AxisModel, path: SampledPath, controller: Controller, extra: FloatArray | None = None, encoder: Encoder | None = None, seed: int = 0
 ) -> Tracked:
-    """Simulate the axis along a path, from its start and speed; extra: (n,) V of feedforward; seed: of the encoder's noise."""
+    """Simulate the axis along a path, from its first position and speed; extra: (n,) V of feedforward; seed: of the encoder's noise."""
     ready, encoder = plant(model, path.sampling_rate), encoder or Encoder()
     library = model.library.looped([model.library[name] for name, _ in model.effects])
     count = path.position.size

@@ -41,7 +41,7 @@ class Compensation:
     path: the path in encoder readings; voltage: (n,) V, added to the feedback
     terms: compensated laws; left: (law, why) of the others
     feedback, simple, chosen: tracking error of the worst sample of the parameters, m rms: feedback alone, with kS kV kA, with the chosen compensation
-    centre: the same three of the model itself; largest: V, that any sample's drive gives
+    centre: the same three of the model itself; largest: the largest voltage of any sample, V
     inverse: the model with the compensated laws, whose feedforward is ``voltage``; None with kS, kV and kA
     """
 
@@ -58,7 +58,7 @@ class Compensation:
 
 
 def left_words(left: Sequence[tuple[str, str]]) -> str:
-    """``, but not A and B (why)`` of laws that are left; empty where none is."""
+    """``, but not A and B (why)`` for the laws that are left out; empty if none is."""
     names: dict[str, list[str]] = {}
     for name, why in left:
         names.setdefault(why, []).append(name)
@@ -67,7 +67,7 @@ def left_words(left: Sequence[tuple[str, str]]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Tried:
-    """A choice of laws: what the encoder has to show, the voltage, and for each sample the error, m rms, and the largest voltage, V.
+    """A choice of laws: the commanded encoder readings, the feedforward, V, the error of each sample, m rms, and the largest voltage, V.
 
     inverse: the model with these laws; None with kS, kV and kA
     """
@@ -85,7 +85,7 @@ class _Tried:
 
 
 def asked_of_encoder(model: AxisModel, path: SampledPath, terms: Sequence[str]) -> SampledPath:
-    """The encoder readings with the load on the path: including the scale's error, and half the gap towards the flank.
+    """The encoder readings with the load on the path: with the scale's error, and half the gap towards the flank in contact.
 
     terms: effects that are corrected
     """
@@ -104,8 +104,8 @@ def asked_of_encoder(model: AxisModel, path: SampledPath, terms: Sequence[str]) 
 def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
     """(n,) the flank of a gap that is in contact: 1 forward, -1 backward, 0 if unknown.
 
-    Dry friction (``rub``, V, of what is carried) keeps it at the flank behind it. A load keeps it at one flank for good where it is larger than that
-    friction, if it acts behind the gap; no encoder at the motor says on which side it acts. So the flank is known where both agree.
+    Dry friction of the carried mass (``rub``, V) keeps the flank behind it in contact. A load larger than that friction keeps one flank in
+    contact, if it acts behind the gap; a motor encoder does not show on which side it acts. So the flank is known where both cases agree.
     """
     way = np.sign(path.speed)
     last = np.maximum.accumulate(np.where(way != 0.0, np.arange(way.size), -1))
@@ -117,8 +117,8 @@ def _flank(model: AxisModel, path: SampledPath, rub: float) -> FloatArray:
 def alike(model: AxisModel, sampling_rate: float) -> tuple[AxisModel, ...]:
     """The model rewritten with other effects whose law is the same while sliding and differs at rest.
 
-    These are one effect for its parts, the parts of one effect, half of the second part in it and half apart, and Coulomb friction for a
-    breakaway that ends within one sample; sampling_rate: Hz
+    In these models, parts are joined to one effect, one effect is split into its parts, half of its second part is split off, or Coulomb
+    friction replaces friction whose breakaway ends within one sample. sampling_rate: Hz
     """
     joined = model.joined()
     found: list[AxisModel] = [joined, _without_breakaway(model, sampling_rate)]
@@ -165,7 +165,7 @@ def at_its_bound(model: AxisModel) -> str:
 def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, controller: Controller, encoder: Encoder | None = None) -> Compensation:
     """The laws of the first model whose compensation helps along the path.
 
-    models: the model and samples of its parameters (``uncertain.samples``); encoder: with its noise presliding friction creeps while the axis rests
+    models: the model and samples of its parameters (``uncertain.samples``); encoder: its noise relaxes presliding friction while the axis rests
     """
     others = alike(models[0], path.sampling_rate)
     judges = (*models, *others)
@@ -213,9 +213,9 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
 def compensate_within(
     models: Sequence[AxisModel], found: Gains, moves: Moves, controller: Controller, encoder: Encoder | None = None
 ) -> tuple[SampledPath, Compensation]:
-    """The path of the moves, slowed until the drive keeps ``RESERVE`` to its limit for every sample of the parameters.
+    """The path of the moves, slowed until every sample of the parameters leaves ``RESERVE`` of the limit free; and its compensation.
 
-    Raises BadInput if even a slow path exceeds it, for example with a controller that does not come to rest.
+    Raises BadInput if even the slowest path needs more, for example with a controller that does not come to rest.
     """
     for scale in SLOWED ** np.arange(SLOWINGS):
         path = moves.sampled(float(scale))

@@ -22,7 +22,7 @@ from xy_sysid.settings import unknown_name
 class Exported:
     """The output for a target.
 
-    files: text by name; note: what the target cannot represent, or how the text is used
+    files: text by name; note: effects that the target cannot represent, or how to use the text
     archive: the name of a functional mock-up unit into which the files are packed; mat: name of a .mat file -> its variables
     """
 
@@ -37,7 +37,7 @@ def tables(used: Used) -> Exported:
     every = [*used.tables, *([used.friction] if used.friction is not None else [])]
     if not every:
         raise BadInput(
-            "tables", f"axis {used.axis}, which has nothing by place and no dry friction", "a model with some", "There is nothing to correct."
+            "tables", f"axis {used.axis}, without dry friction and effects by position", "a model with one", "There is nothing to correct."
         )
     return Exported({f"{used.axis}_{item.name}.csv": item.csv() for item in every}, "; ".join(f"{item.name}: {item.meaning}" for item in every))
 
@@ -167,7 +167,7 @@ TARGETS: dict[str, Callable[[Used], Exported]] = {
 
 
 def export(used: Used, target: str) -> Exported:
-    """The files of a target. Raises BadInput for an unknown target, or an axis for which it has nothing."""
+    """The files of a target. Raises BadInput for an unknown target, or an axis that it cannot represent."""
     if target not in TARGETS:
         raise unknown_name(target, list(TARGETS), "target")
     return TARGETS[target](used)

@@ -24,9 +24,9 @@ from xy_sysid.errors import BadInput
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
-POSITION, INTEGRAL = 4.0, 10.0  # factors below the crossover of the position loop and the integral: they cost 14 and 6 degrees there
-DERIVATIVE = 8.0  # factor above the crossover at which the derivative is cut: 7 degrees
-PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, and times: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3 ask for 30 to 60 and 2 to 5
+POSITION, INTEGRAL = 4.0, 10.0  # crossover over the corner of the position loop and of the integral: they cost 14 and 6 degrees of phase
+DERIVATIVE = 8.0  # cut-off of the derivative's low-pass over the crossover: it costs 7 degrees
+PHASE_MARGIN, GAIN_MARGIN = 45.0, 2.0  # degrees, factor: Astrom & Murray, Feedback Systems, 2nd ed., sec. 10.3 ask for 30 to 60 and 2 to 5
 MOST_PHASE, MOST_GAIN = 90.0, 100.0  # largest margins that may be requested
 COUNT = 24  # samples of the parameters
 STEPS = 60  # number of crossovers to test
@@ -38,7 +38,7 @@ ToTry = TypeVar("ToTry")
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """phase: degrees; gain: times, upwards; sensitivity: largest of 1 / |1 + L|; crossover: Hz, the highest; stable: whether the loop is."""
+    """phase: degrees; gain: factor upwards; sensitivity: largest 1 / |1 + L|; crossover: Hz, the highest; stable: of the closed loop."""
 
     phase: float
     gain: float
@@ -49,7 +49,10 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """The requirements of a loop. phase: degrees; gain: times, upwards; bandwidth: crossover, Hz (None: the largest). Raises BadInput."""
+    """The requirements of a loop. phase: degrees; gain: factor upwards; bandwidth: crossover, Hz (None: the largest).
+
+    Raises BadInput for margins out of range.
+    """
 
     phase: float = PHASE_MARGIN
     gain: float = GAIN_MARGIN
@@ -62,7 +65,7 @@ class Asked:
             raise BadInput("gain margin", f"{self.gain:g}", f"above 1, up to {MOST_GAIN:g} (times, not dB)", "Ask for 2 to 5.")
 
     def tries(self, sampling_rate: float, steps: int) -> list[float]:
-        """Hz, the bandwidths to test, the largest first. Raises BadInput if out of range."""
+        """The crossovers to test, Hz, the largest first. Raises BadInput for a bandwidth out of range."""
         if self.bandwidth is None:
             return [float(item) for item in np.geomspace(HIGHEST * sampling_rate, 1e-4 * sampling_rate, steps)]
         if not 0.0 < self.bandwidth <= HIGHEST * sampling_rate:
@@ -70,13 +73,13 @@ class Asked:
         return [self.bandwidth]
 
     def refused(self, what: str, worst: Margins) -> BadInput:
-        """The error if no bandwidth has the margins; worst: margins of the last one."""
+        """The error if no crossover keeps the margins; worst: margins of the last one."""
         said = f"phase margin {worst.phase:.3g} degrees and gain margin {worst.gain:.3g}" if worst.stable else "unstable"
         given = f"{self.bandwidth:g} Hz" if self.bandwidth is not None else "any"
         return BadInput(what, f"{given}: {said}", f"at least {self.phase:g} degrees and {self.gain:g}", ADVICE)
 
     def met(self, found: Margins) -> bool:
-        """Whether a loop is stable and keeps both."""
+        """Whether a loop is stable and has both margins."""
         return found.stable and found.phase >= self.phase and found.gain >= self.gain
 
 
@@ -87,11 +90,11 @@ USUAL = Asked()
 class Feedback:
     """A controller with its margins.
 
-    controller: as ``closed_loop`` runs it; sampling_rate: Hz; crossover: rad/s asked for
-    asked: margins that were asked for; nominal, worst: those of the model, and the least of each over the samples; count: of these
-    bare, counted: the least margins without the filter on the derivative, which some controllers lack, and with times in whole ms
+    controller: as ``closed_loop`` runs it; sampling_rate: Hz; crossover: rad/s, of the design
+    asked: the requirements; nominal, worst: margins of the model, and the least of each over ``count`` samples
+    bare: the least margins without the low-pass on the derivative, which some controllers lack; counted: with times in whole ms
     bandwidth: Hz, where the closed loop falls below -3 dB
-    noise: V rms that encoder noise and counting make; short: the margin that allows no more bandwidth, ``phase`` or ``gain``
+    noise: V rms due to encoder noise and counts, the largest of the first 4 samples; short: the limiting margin, ``phase`` or ``gain``
     """
 
     controller: Controller
@@ -204,7 +207,7 @@ def feedback(
     """The controller of the largest (or requested) crossover whose margins hold for every sample of the parameters.
 
     sections: filters in series with the feedback, (k, 5); encoder: for its noise; limit: of the drive, V
-    Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
+    Raises BadInput if the data do not determine gain or pole, or if no crossover keeps the margins.
     """
     systems = loop_systems(model, sampling_rate)
     filters = np.zeros((0, 5)) if sections is None else sections
@@ -214,9 +217,9 @@ def feedback(
 
 
 def loop_systems(model: PhysicalModel, sampling_rate: float) -> list[Sampled]:
-    """The sampled model, first as fitted, then with samples of its parameters, then the motor alone inside a gap: a loop keeps its margins with all.
+    """The systems with which a loop must keep its margins: the sampled model as fitted, with samples of its parameters, the motor inside a gap.
 
-    Raises BadInput where gain or pole are not determined by the data.
+    Raises BadInput if the data do not determine gain or pole.
     """
     doubtful = undetermined(model, ("gain", "pole"))
     if model.parameters and doubtful:
@@ -232,7 +235,7 @@ def first_kept(
 ) -> tuple[ToTry, Margins, Margins]:
     """The first controller that keeps the margins with every system; the margins with the first system, and the least.
 
-    of: margins of a system under a controller. Raises BadInput with the margins of the last one where none keeps them.
+    of: margins of a system under a controller. Raises BadInput with the margins of the last controller if none keeps them.
     """
     worst = Margins(phase=0.0, gain=0.0, sensitivity=math.inf, crossover=0.0, stable=False)
     for item in tried:
@@ -245,7 +248,7 @@ def first_kept(
 
 
 def within_a_gap(model: AxisModel) -> tuple[AxisModel, ...]:
-    """The motor alone, if an effect defines its share of the mass: inside an open gap the loop drives less mass and must keep its margins."""
+    """The motor alone, if an effect has its share of the mass: inside an open gap the loop drives less mass and must keep its margins."""
     found = []
     for name, values in model.effects:
         share = dict(zip(model.library[name].names, values, strict=True)).get("share")

@@ -42,8 +42,8 @@ class Swing:
 class LoopFilter:
     """A second-order section in the loop: a notch at a resonance, or a low-pass.
 
-    kind: ``notch`` or ``low-pass``; frequency: Hz, of the resonance or the cut; depth: gain at it; width: damping ratio of its poles
-    section: (5,) b0, b1, b2, a1, a2 at the sampling rate, Hz; covers: whether a notch's -3 dB width holds the interval of the frequency
+    kind: ``notch`` or ``low-pass``; frequency: Hz, of the resonance or the cut-off; depth: gain there; width: damping ratio of the poles
+    section: (5,) b0, b1, b2, a1, a2 at the sampling rate, Hz; covers: whether a notch's -3 dB width covers the interval of the frequency
     """
 
     kind: str
@@ -66,7 +66,7 @@ class Shaper:
     """An input shaper: pulses that replace a single one.
 
     name: zv, mzv, zvd or ei; frequency: Hz; damping: ratio; amplitudes, times: (k,) sum 1, s
-    vibration: part of the unshaped residual vibration that is left at the frequency; worst: over the interval of the frequency, 1 if that has no end
+    vibration: residual vibration at the frequency relative to no shaper; worst: the same at the ends of its interval too, 1 if an end is unknown
     """
 
     name: str
@@ -79,7 +79,7 @@ class Shaper:
 
     @property
     def duration(self) -> float:
-        """Time by which the shaper makes a path longer, s."""
+        """Time that the shaper adds to a path, s."""
         return self.times[-1]
 
     def shape(self, path: SampledPath) -> SampledPath:
@@ -125,10 +125,10 @@ def _pairs(model: AxisModel) -> tuple[list[tuple[float, float]], list[tuple[floa
 
 
 def notch(mode: Swing, sampling_rate: float) -> LoopFilter:
-    """The notch of a mode's resonance, as deep as the resonance is high and as wide as its interval.
+    """The notch of a mode's resonance: as deep as the resonance is high, and as wide as the interval of its frequency.
 
     Its zeros have the damping of the resonance. Source: Franklin, Powell & Emami-Naeini, Feedback Control of Dynamic Systems, 7th ed., sec. 6.7.
-    Raises BadInput for a resonance that lies too high for the sampling rate: the loop would have the notch at its alias.
+    Raises BadInput for a resonance above ``HIGHEST`` of the sampling rate.
     """
     f = mode.free.value
     if f >= HIGHEST * sampling_rate:
@@ -153,7 +153,7 @@ def notch(mode: Swing, sampling_rate: float) -> LoopFilter:
 
 
 def low_pass(frequency: float, sampling_rate: float) -> LoopFilter:
-    """A Butterworth low-pass of second order with its cut at a frequency below half the sampling rate, Hz."""
+    """A Butterworth low-pass of second order; frequency: cut-off, Hz, below half the sampling rate."""
     b, a = scipy.signal.butter(2, frequency, fs=sampling_rate)
     section = np.array([b[0], b[1], b[2], a[1], a[2]])
     half = math.sqrt(0.5)

@@ -148,7 +148,7 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueR
 
 
 def files(of: Program, name: str, title: str, units: Units) -> dict[str, str]:
-    """modelDescription.xml and the sources, by their places in the archive; the binary is made of ``sources/NAME_fmu.c``."""
+    """modelDescription.xml and the sources, by their paths in the archive; the binary is compiled from ``sources/NAME_fmu.c``."""
     header, text = source(of, name, title)
     guid = "{" + hashlib.sha256(text.encode()).hexdigest()[:32] + "}"
     rows = (("u", 0, "input", "input", units.input), ("y", 1, "output", "position", units.output), ("v", 2, "output", "speed", units.speed))
@@ -186,6 +186,6 @@ def _variable(name: str, reference: int, causality: str, told: str, unit: str) -
 
 
 def _unit(name: str) -> str:
-    """A unit by its name, in SI where that is known."""
+    """The definition of a unit, with its SI exponents if they are known."""
     powers = BASES.get(name)
     return f"    <Unit name={quoteattr(name)}>{'' if powers is None else f'<BaseUnit {powers}/>'}</Unit>"

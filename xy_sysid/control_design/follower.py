@@ -26,10 +26,10 @@ QUIET = 0.5  # s at rest before each path, with its own feedforward
 
 @dataclass(frozen=True, slots=True)
 class Tryout:
-    """How one axis is driven.
+    """The plan for one axis.
 
-    controller: PID, calculated once a block; block: samples; gains: kS, kV, kA; compensation: what is undone; path: where the axis is wanted
-    asked: (3, n) what the encoder is asked to show, m, and voltage: (3, n) V, for each of ``KINDS``
+    controller: PID, calculated once a block; block: samples; gains: kS, kV, kA; compensation: the chosen laws; path: of the axis
+    asked: (3, n) commanded encoder readings, m; voltage: (3, n) feedforward, V; a row for each of ``KINDS``
     """
 
     controller: Controller
@@ -42,7 +42,7 @@ class Tryout:
 
 
 def plan(model: PhysicalModel, moves: Moves, block: int, limit: float, encoder: Encoder | None = None) -> Tryout:
-    """The plan of an axis along the path of the moves. Raises BadInput where no controller has the margins, or the limit would be reached."""
+    """The plan of an axis along the path of the moves. Raises BadInput if no controller keeps the margins, or if the path needs too much voltage."""
     sampling_rate = moves.sampling_rate
     late = later(model, 1.0 / sampling_rate)  # the newest reading is of the sample before
     controller = feedback(late, sampling_rate / block, limit=limit).controller
@@ -56,11 +56,11 @@ def plan(model: PhysicalModel, moves: Moves, block: int, limit: float, encoder: 
 class Follower:
     """Executes a plan: ``step`` takes the newest reading and returns the voltages of the next block, until ``over``.
 
-    Each kind runs the path twice, and the second lap counts: in the first the integral settles to the residual error of the feedforward.
+    Each kind runs the path twice. The first lap does not count: in it the integral settles to the residual error of the feedforward.
     """
 
     def __init__(self, made: Tryout, here: float, length: int | None = None) -> None:
-        """here: m, present position; length: least samples of each path, so that several axes start together."""
+        """here: present position, m; length: least samples of each path, so that several axes start together."""
         self.plan = made
         size = max(length or 0, made.path.position.size)
         quiet = round(QUIET * made.path.sampling_rate)

@@ -38,7 +38,7 @@ class Gains:
 
     @property
     def unsure(self) -> tuple[str, ...]:
-        """Names of the gains that the data do not determine, with kCos where its angle is not. No angle is one of them: 0 is an angle as well."""
+        """Names of the gains that the data do not determine, with kCos if its angle is not determined. The angle itself is never one of them."""
         lost = any(item.name == ANGLE and not is_known_angle(item.low, item.high) for item in self.items)
         sure = {item.name: is_determined(item.value, item.low, item.high) and not (lost and item.name == ARM) for item in self.items}
         return tuple(name for name, is_sure in sure.items() if name != ANGLE and not is_sure)
@@ -50,7 +50,7 @@ class Gains:
 
 
 def gains(model: PhysicalModel, speed: float | None = None) -> Gains:
-    """kS, kV and kA, and what else is constant or turns with an angle; speed: m/s, at which kS is taken (the usual one by default)."""
+    """kS, kV, kA, and kG, kCos and values by direction if the model has them; speed: m/s, at which kS is taken (that of 1 V by default)."""
     usual = abs(speed if speed is not None else USUAL_SPEED * model.model.gain)
     way = math.copysign(1.0, model.model.gain)
 
@@ -81,7 +81,7 @@ def gains(model: PhysicalModel, speed: float | None = None) -> Gains:
 
 
 def _turning(model: AxisModel) -> tuple[float, float]:
-    """Force of the laws of an angle at a quarter turn and at 0, V: those of sine and cosine."""
+    """Amplitudes of sine and cosine of the forces by angle, V: their values at a quarter turn and at 0."""
 
     def at(x: float) -> float:
         turned = [item for item in of_category(model, "force") if item[0].angular]
@@ -91,7 +91,7 @@ def _turning(model: AxisModel) -> tuple[float, float]:
 
 
 def simple_feedforward(found: Gains, path: SampledPath, friction_too: bool = True) -> FloatArray:
-    """(n,) voltage along a path, V: kS sign(v) + kV v + kA a (and kG), as drives calculate it, without looking ahead."""
+    """(n,) voltage along a path, V: kS sign(v) + kV v + kA a (and kG, kCos), as drives calculate it, without preview."""
     return np.asarray(
         (found.value("kS") * np.sign(path.speed) if friction_too else 0.0)
         + found.value("kV") * path.speed

@@ -54,7 +54,7 @@ def parts_of_sample(ready: Plant) -> int:
 def feedforward(model: AxisModel, path: SampledPath, shake: float = 0.0) -> Feedforward:
     """The voltage along a path, with delay, hold, lag, resonances and amplifier undone; see ``not_undone`` for the rest.
 
-    shake: m/s, mean absolute speed that noise gives the axis in its loop while it rests (``closed_loop.shake``): presliding friction relaxes by it
+    shake: m/s, mean absolute speed of the axis due to noise at rest (``closed_loop.shake``), which relaxes presliding friction
     """
     ready = plant(model, path.sampling_rate, shake=shake)
     ahead = ahead_of(model, path.sampling_rate)

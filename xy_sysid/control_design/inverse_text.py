@@ -1,7 +1,7 @@
-"""The text of one sample of the feedforward: the voltage that moves an axis model as a path asks, law by law against the direction of the signal.
+"""The text of one sample of the feedforward: the voltage that moves an axis model along a path.
 
-Encoder, resonances, base, forces, friction, lag and amplifier are inverted in this order. The attached masses follow the path's
-speed, so that a resonance is inverted without differentiation. As in ``step_text``: one text, compiled here and printed in other languages.
+Encoder, resonances, base, friction, forces, lag and amplifier are inverted in this order, against the signal path. The attached masses follow
+the path's speed, so a resonance is inverted without differentiation. As in ``step_text``, one text is compiled here and printed in other languages.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class InverseText(LawText):
         """Source of ``name(r, v, acc, h, cuts, p, on, z, moving, guided, s, w)``, V; of one model without ``p, on, z``.
 
         r, v, acc: position, speed and acceleration wanted; h: a sample, s; cuts: parts of it, so short that the series holds;
-        guided: the generator of what hangs on an axis that is moved; s: a state of the same layout as the simulation's, but without a ring
+        guided: the generator of the masses attached to an axis with prescribed acceleration; s: a state with the layout of the simulation's
         """
         n = self.numbers["n"]
         return TEMPLATE.substitute(
@@ -127,7 +127,7 @@ class InverseText(LawText):
         return [f"for _ in range({PASSES}):", *("    " + line for line in lines)] if asks else lines
 
     def _lag(self) -> list[str]:
-        """Inverse of a first-order lag: adds its time constant times the rate of change; nothing at standstill."""
+        """Inverse of a first-order lag: adds its time constant times the rate of change."""
         lines: list[str] = []
         for effect in self.of("state"):
             if len(effect.states) == 1:

@@ -48,7 +48,7 @@ def friction(model: AxisModel, speed: float, direction: float) -> float:
 def force(model: AxisModel, speed: float, place: float, *, of_speed: bool | None = None, by_place: bool | None = None) -> float:
     """Force against the drive at a speed and a position, V, without dry friction and the base's own drag.
 
-    of_speed, by_place: only laws that depend on speed, or on position (True), or that do not (False)
+    of_speed, by_place: only laws that depend (True) or do not depend (False) on speed, on position; None: all
     """
     total = 0.0
     for effect, values in of_category(model, "force"):
@@ -101,5 +101,5 @@ def along(model: AxisModel, places: FloatArray, what: str) -> FloatArray:
 
 
 def lost_in(language: str, effect: Effect) -> str:
-    """The part of an effect that is lost in a format with only the mean level of dry friction."""
+    """What a format that has only the mean level of dry friction keeps of an effect."""
     return "only its mean level at speed is kept" if effect.is_dry else f"{language} cannot express it"

@@ -17,14 +17,14 @@ from xy_sysid.errors import BadInput
 
 RESERVE = 0.2  # of the limit, reserved for the feedback
 SHARES = np.linspace(0.15, 0.85, 8)  # shares of the voltage for speed to test; the rest is for acceleration
-ROUNDS, LOWEST = 10, 0.01  # of halving, to 1e-3, down to a hundredth of what the rigid axis could do
+ROUNDS, LOWEST = 10, 0.01  # bisections, to 1e-3; lowest scale of the rigid axis' bounds
 PLACES = 101  # positions between two ends at which forces are evaluated
 JERK_TIME = 0.02  # least s for building up an acceleration, if there is no resonance
 
 
 @dataclass(frozen=True, slots=True)
 class Fastest:
-    """bounds: of the fastest S-curve; path: of the move; voltage: largest of the whole feedforward, V; limit, reserve: V, and the part kept free."""
+    """bounds: of the fastest S-curve; path: of the move; voltage: largest of the feedforward, V; limit: V; reserve: part of it kept free."""
 
     bounds: Bounds
     path: SampledPath
@@ -36,7 +36,7 @@ class Fastest:
 def fastest(models: Sequence[AxisModel], places: Sequence[float], limit: float, sampling_rate: float, reserve: float = RESERVE) -> Fastest:
     """The S-curve through the places that takes least time while the voltage of every model stays below (1 - reserve) limit.
 
-    models: samples of the parameters: the worst counts. Raises BadInput if even a crawl needs more than there is.
+    models: samples of the parameters; places: m; limit: V. Raises BadInput if even the slowest motion needs more voltage.
     """
     if not 0.0 < limit < math.inf:
         raise BadInput("limit", f"{limit} V", "above 0 and finite", "Give the drive's largest voltage with limit=.")

@@ -1,8 +1,8 @@
 """A table, measured on a recording, of the force by position that the model does not explain.
 
-A ball screw has cogging of many periods, and the force of a cable has no simple law; a table can represent such forces. The part of the recorded
-input that the model does not predict is averaged as a function of position, linear between grid points. Cross-validation selects the grid spacing
-and whether there is a table at all: the table of one half of the recording is judged on the other half.
+A table can represent forces without a simple law, such as cogging with many periods or the force of a cable. It is fitted to the part of the
+recorded input that the model does not predict, linear between grid points. Cross-validation selects the grid spacing, and whether there is a
+table at all: the table of one half of the recording is tested on the other half.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from xy_sysid.samples.recording import Run
 
 BLOCKS = 10  # of the recording, to compare a gain with its scatter
 SURE = 3.0  # standard errors of gain that a table needs, because the best of several is selected
-SHRUNK = 1.0  # weight of zero force at each grid point, in samples, so that points without data get none
+SHRUNK = 1.0  # weight of zero force at each grid point, in samples: points without data get 0
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredTable:
-    """at: (k,) places, m, evenly spaced; value: (k,) V to be added there; error: (k,) its standard error, V.
+    """at: (k,) positions, m, evenly spaced; value: (k,) V to be added there; error: (k,) its standard error, V.
 
     parts: (2, k) the tables of the first and of the second half of the recording
     before, after: V rms of the unexplained input, without and with the table of the other half of the recording
@@ -47,7 +47,7 @@ class MeasuredTable:
         return np.interp(path.position, self.at, self.value)
 
     def of_other_half(self, path: SampledPath) -> FloatArray:
-        """(n,) V along the recording's own path: in each half by the table of the other one."""
+        """(n,) V along the path of the recording: each half with the table of the other half."""
         half = path.position.size // 2
         ends = path.position[:half], path.position[half:]
         return np.concatenate([np.interp(places, self.at, table) for places, table in zip(ends, self.parts[::-1], strict=True)])
@@ -69,7 +69,7 @@ class MeasuredTable:
 def measured_table(model: PhysicalModel, run: Run, below: float) -> MeasuredTable | None:
     """The unexplained input of a run by position, as a table; None if no table gains more than ``SURE`` of its standard errors.
 
-    below: Hz of the motion that is used. Raises BadInput where the run is too short.
+    below: cut-off of the low-pass on the motion, Hz. Raises BadInput if the run is too short or does not move.
     """
     path = recorded(run.position, run.sampling_rate, below)
     left = run.voltage - feedforward(model.model, path).voltage
@@ -93,7 +93,7 @@ def measured_table(model: PhysicalModel, run: Run, below: float) -> MeasuredTabl
 
 
 def _basis(position: FloatArray, at: FloatArray) -> scipy.sparse.csr_array:
-    """(n, k) shares of the two places around each sample."""
+    """(n, k) weights of the two grid points around each sample."""
     rows = np.arange(position.size)
     before = np.clip(((position - at[0]) / (at[1] - at[0])).astype(np.int64), 0, at.size - 2)
     share = np.clip((position - at[before]) / (at[1] - at[0]), 0.0, 1.0)
@@ -102,6 +102,6 @@ def _basis(position: FloatArray, at: FloatArray) -> scipy.sparse.csr_array:
 
 
 def _fitted(basis: scipy.sparse.csr_array, values: FloatArray) -> FloatArray:
-    """(k,) the table of least squares, drawn to 0 as by ``SHRUNK`` samples at each place."""
+    """(k,) the table of least squares, with ``SHRUNK`` samples of 0 at each grid point."""
     normal = basis.T @ basis + SHRUNK * scipy.sparse.eye_array(basis.shape[1])
     return np.asarray(scipy.sparse.linalg.spsolve(scipy.sparse.csc_array(normal), basis.T @ values))

@@ -1,7 +1,7 @@
 """A refined model as MJCF (MuJoCo 4), effect by effect; effects that MJCF cannot represent are named.
 
 Forces are in the unit of the input: the mass is kA, the damping kV. A resonance becomes a mass on a spring behind the joint. Cogging and bristles are
-motors without a constant (``dcmotor``), whose friction and cogging MuJoCo knows.
+motors (``dcmotor``) with a negligible constant, whose friction and cogging MuJoCo simulates.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from xy_sysid.control_design.sample_step import sections
 from xy_sysid.effects import Effect
 from xy_sysid.samples.block import FloatArray
 
-SHORT = 1e-6  # m: deflection of bristles that represent friction which falls with speed and has none itself
-CRITICAL = 0.5  # of the damping at which such bristles do not swing on the mass
+SHORT = 1e-6  # m: deflection of bristles that approximate friction without presliding that falls with speed
+CRITICAL = 0.5  # damping of such bristles over the root of stiffness times mass: a damping ratio of 0.25
 TINY = 1e-9  # motor constant of a motor that has only friction or cogging
-RUBBING = 64_000.0  # Hz of the steps with dry friction: it leaves 0.2 % of the motion there, and 2 % at 16 kHz
-EXACT = 1e-6  # of the largest force: by which a law may differ from what it is said to be
+RUBBING = 64_000.0  # Hz of the steps with dry friction: an error of 0.2 % of the motion, and 2 % at 16 kHz
+EXACT = 1e-6  # of the largest force: tolerance within which a law counts as a sine or a polynomial
 
 
 @dataclass(slots=True)
@@ -50,7 +50,7 @@ class Mjcf:
 
 
 def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: str = "axis") -> Mjcf:
-    """The model for one input ``drive`` that is held for a sample, and one joint whose position is the axis'; angular: it turns, and is in rad."""
+    """The model for one input ``drive``, held for a sample, and one joint with the axis' position; angular: True for a rotary axis, rad."""
     said = Said()
     _forces(model, said)
     turn = math.copysign(1.0, model.gain)
@@ -118,7 +118,7 @@ def _num(value: float) -> str:
 
 
 def _forces(model: AxisModel, said: Said) -> None:
-    """Add forces by position as waves or cubic polynomials; constant ones are included in these."""
+    """Add quadratic drag, and forces by position as waves or cubic polynomials, which include constant forces."""
     for effect, values in of_category(model, "force"):
         words = asks(effect)
         if "u" in words:
@@ -191,7 +191,7 @@ def _spring(polynomial: FloatArray, turn: float) -> tuple[float, str]:
 
 
 def _friction(model: AxisModel, said: Said) -> float | tuple[float, ...]:
-    """One level, V, 0 without any; or the LuGre model: stiffness, damping, level at speed, at rest, and the speed between."""
+    """One level, V (0 without any); or the LuGre model: stiffness, damping, level at speed, level at rest, speed at which it falls."""
     bristles, plain = list(of_category(model, "bristle")), list(of_category(model, "friction"))
     if not bristles and not plain:
         return 0.0
@@ -216,7 +216,7 @@ def _friction(model: AxisModel, said: Said) -> float | tuple[float, ...]:
 
 
 def _falls(level: Callable[[float], float], end: float, fast: float) -> float:
-    """The speed at which what friction has at rest beyond its level at speed has fallen to 1 / e, m/s."""
+    """The speed, m/s, at which the excess of friction over its level at high speed has fallen to 1 / e."""
     top = level(0.0) - end
     if top <= EXACT * end:
         return fast
@@ -260,7 +260,7 @@ class Hung:
 def _bodies(model: AxisModel, said: Said) -> tuple[float, float, Hung | None]:
     """Mass and drag at the joint, and the mass attached to it.
 
-    Base and table are one pole-zero pair, which two masses on a spring have too. With P, Z = 1 at 0 Hz, (m s + c) P has to be
+    A base resonance is one pole-zero pair, as that of two masses on a spring. With P, Z = 1 at 0 Hz, (m s + c) P has to be
     (J s + c1) Z + (M s + c2) (1 + (d / k) s) with Z = 1 + ((d + c2) / k) s + (M / k) s2: six equations for J, M, c1, c2, d and k.
     """
     whole, drag = 1.0 / (abs(model.gain) * model.pole), 1.0 / abs(model.gain)

@@ -1,4 +1,4 @@
-"""Paths: position, speed and acceleration at each sample, jerk-limited between places, or the motion of a recording below a frequency."""
+"""Paths: position, speed and acceleration at each sample, jerk-limited between positions, or the motion of a recording below a frequency."""
 
 from __future__ import annotations
 
@@ -75,10 +75,10 @@ class SampledPath:
 
 
 def s_curve(places: Sequence[float], bounds: Bounds, sampling_rate: float, settle: float = SETTLE) -> SampledPath:
-    """Moves between positions, m, each as fast as the bounds allow, with rests of ``settle`` s in between.
+    """Moves between positions, m, each as fast as the bounds allow, with rests of ``settle`` s before, between and after them.
 
     A move is a step of position through three moving averages whose lengths are distance / speed, speed / acceleration and acceleration / jerk,
-    so that speed, acceleration and jerk stay within their bounds. Source: Biagiotti & Melchiorri, SampledPath Planning for Automatic Machines and
+    so that speed, acceleration and jerk stay within their bounds. Source: Biagiotti & Melchiorri, Trajectory Planning for Automatic Machines and
     Robots, Springer 2008, sec. 4.5. Raises BadInput for fewer than two places.
     """
     if len(places) < 2:
@@ -115,7 +115,7 @@ def of_position(position: FloatArray, sampling_rate: float) -> SampledPath:
 
 
 def recorded(position: FloatArray, sampling_rate: float, below: float) -> SampledPath:
-    """The measured position (n,), m, below a frequency, Hz, filtered without delay. Raises BadInput if the recording is too short."""
+    """The measured position (n,), m, low-passed without delay; below: cut-off, Hz. Raises BadInput if the recording is too short."""
     top = 0.45 * sampling_rate
     if position.size < 64:
         raise BadInput("samples of the recording", f"{position.size}", "64 or more", "Give a longer one.")

@@ -55,7 +55,7 @@ class Printer(ABC):
         raise self.refuse(node)
 
     def comparison(self, node: ast.Compare) -> str:
-        """The text of a comparison, also of a chain."""
+        """The text of a comparison or of a chain of them."""
         parts, left = [], node.left
         for operator, right in zip(node.ops, node.comparators, strict=True):
             word = self.UNEQUAL if isinstance(operator, ast.NotEq) else COMPARISONS[type(operator)]

@@ -31,10 +31,10 @@ NAMED = {"cuts_old", "cuts_new", "back_old", "back_new", "n", "ring"}
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """functions: in the order in which they call one another; step, feedforward: names of the last two, of one sample each
+    """functions: in call order; the last two are one sample of the simulation and one of the feedforward.
 
-    arrays: constants by name; states, room: numbers of the state and of the scratch array; parts: of a sample in the feedforward
-    plant: what it is of; ahead: s by which the feedforward looks at the path ahead
+    arrays: constants by name; states, room: sizes of the state and of the scratch array; parts: of a sample in the feedforward
+    plant: the simulated model; ahead: preview of the path that the feedforward needs, s
     """
 
     functions: tuple[ast.FunctionDef, ...]
@@ -47,7 +47,7 @@ class Program:
 
     @property
     def rate(self) -> float:
-        """Hz, rate at which both are called."""
+        """Rate at which simulation and feedforward are called, Hz."""
         return self.plant.sampling_rate
 
 
@@ -122,7 +122,7 @@ def _only(module: ast.Module) -> ast.FunctionDef:
 
 
 def _reached(start: Iterable[ast.FunctionDef], known: list[ast.FunctionDef]) -> list[ast.FunctionDef]:
-    """The functions that are called, in their order."""
+    """The functions of ``known`` that are called directly or indirectly, in their order."""
     by_name = {item.name: item for item in known}
     found: set[str] = set()
     todo = list(start)
@@ -190,6 +190,6 @@ def returns_of(function: ast.FunctionDef) -> int:
 
 
 def independent(targets: ast.Tuple, values: ast.Tuple) -> bool:
-    """True if a tuple assignment equals assignments in sequence: no value reads what another assigns."""
+    """True if a tuple assignment equals assignments in sequence: no value reads a name that another assigns."""
     set_to = {node.id for part in targets.elts for node in ast.walk(part) if isinstance(node, ast.Name)}
     return not any(isinstance(node, ast.Name) and node.id in set_to for part in values.elts for node in ast.walk(part))

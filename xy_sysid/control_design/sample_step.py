@@ -1,4 +1,4 @@
-"""A refined model simulated sample by sample, as a controller needs it: generator, numbers, state."""
+"""Simulation of a refined model sample by sample, as a controller needs it: generator, numbers, state."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LONGEST = 4096  # samples of delay that fit into a state
 class Plant:
     """An axis model at one rate, ready for simulation.
 
-    parameters, flags: of the whole library; numbers: of ``NUMBERS``; moving, still: generators in one row; layout: of its state
+    parameters, flags: of all effects of the loop; numbers: of ``NUMBERS``; moving, still: (n n,) generators by rows; layout: of the state
     """
 
     model: AxisModel
@@ -45,7 +45,7 @@ class Plant:
 
     @property
     def order(self) -> int:
-        """n: number of position, speed, attached masses and force."""
+        """n: number of states (position, speed, those of attached masses) plus one for the force."""
         return round(math.sqrt(self.moving.size))
 
     def number(self, name: str) -> float:
@@ -58,7 +58,7 @@ class Plant:
 
 
 def sections(model: AxisModel, sampling_rate: float) -> tuple[FloatArray, FloatArray]:
-    """Zeros and poles of all resonances as polynomials of s / rate, lowest power first, monic. Raises BadInput for one without roots in s."""
+    """Zeros and poles of all resonances as monic polynomials of s / rate, lowest power first. Raises BadInput for one without zeros or poles in s."""
     top, bottom = np.ones(1), np.ones(1)
     for name, values in model.effects:
         effect = model.library[name]
@@ -76,11 +76,11 @@ def sections(model: AxisModel, sampling_rate: float) -> tuple[FloatArray, FloatA
 
 
 def plant(model: AxisModel, sampling_rate: float, whole: bool = True, shake: float = 0.0) -> Plant:
-    """The model at this rate. whole: for the loop of the full library, else with the layout of this model alone, for printing.
+    """The model at a rate, Hz. whole: True for the compiled loop of the library, False for the layout of this model alone, for printing.
 
     shake: m/s, mean absolute speed due to noise at rest, which the feedforward takes into account
 
-    Raises BadInput for an implausible delay, or a resonance without roots in s.
+    Raises BadInput for a delay of more than ``LONGEST`` samples, or a resonance without zeros or poles in s.
     """
     top, bottom = sections(model, sampling_rate)
     if top.size > 1:
@@ -147,7 +147,7 @@ def step_of(library: Library) -> Callable[..., float]:
 
 
 def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray, start: float = 0.0) -> FloatArray:
-    """(n,) encoder position at each sample for a voltage (n,), from speed ``start`` at position 0, m; the input is the only drive."""
+    """(n,) encoder position, m, for a voltage (n,), V, from position 0 and speed ``start``, m/s; there is no feedback."""
     ready = plant(model, sampling_rate)
     step, state, room = step_of(model.library.looped([model.library[name] for name, _ in model.effects])), ready.rest(), np.zeros(ROOM * ready.order)
     begin(ready, state, start)

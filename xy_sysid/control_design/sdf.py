@@ -13,15 +13,15 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design.laws import along, asks, friction, largest_voltage, lost_in
 from xy_sysid.effects._contract import Effect
 
-PLACES = 101  # at which a spring is asked whether it is straight
+PLACES = 101  # positions at which a spring is tested for linearity
 ANYWHERE = -1.0, 1.0  # m or rad, range for a spring if the travel is unknown
-STRAIGHT = 1e-6  # of its force at the end of the travel: a spring that bends less is one number
+STRAIGHT = 1e-6  # of the largest force: largest deviation of a spring that counts as linear
 
 
 def sdf(
     model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool, name: str = "axis"
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad, None if unknown; limit: of the drive, infinite if unknown."""
+    """(text, (effect, loss) of each that is lost); travel: m or rad, None if unknown; limit: of the drive, V, infinite if unknown."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     places = np.linspace(*(travel or ANYWHERE), PLACES)
     pull = along(model, places, "force") * math.copysign(1.0, model.gain)
@@ -66,5 +66,5 @@ def sdf(
 
 
 def _spring(effect: Effect) -> bool:
-    """Whether it is a force by position alone."""
+    """Whether an effect is a force that depends on position alone."""
     return effect.category == "force" and asks(effect) - {"gain", "pole"} == {"x"}

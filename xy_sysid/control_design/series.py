@@ -1,8 +1,8 @@
 """Base and resonances over a part of a sample, as power series in time: the linear part of every printed simulation.
 
 A state is (x, v, q_0 .. q_(m-1)) as in ``axis.resonant_loop``, n = m + 3 with the force that drives it; ``a`` is its generator (n, n) in one
-row. The sub-steps are so short that ten powers are exact to 1e-9. These functions are printed in other languages as they stand, so
-they use numbers, loops and flat arrays only.
+row. The sub-steps are so short that ten powers are exact to 1e-9. These functions are printed in other languages, so they use numbers,
+loops and flat arrays only.
 """
 
 from __future__ import annotations

@@ -15,12 +15,12 @@ from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
 DEGREE = TURN / 360.0  # rad
-LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margins without a filter on the derivative; smaller is near instability for a machine that warms up
+LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margins without the derivative's low-pass or with rounded times: a machine that warms up needs them
 
 
 @dataclass(frozen=True, slots=True)
 class Designed:
-    """What a snippet is written from: the axis' name and model, and what was designed for it.
+    """The content of a snippet: the axis' name and model, and the designs for it.
 
     calculation: periods from reading to writing; speed: m/s, the largest of the fastest path; None if the limit of the drive is unknown
     """
@@ -80,7 +80,7 @@ def ros2_control(of: Designed) -> Snippet:
         f"        feedforward_gain: {of.gains.value('kV'):.6g}{_unsure(of, 'kV', '  # ')}",
     ]
     note = (
-        "feedforward_gain is kV: the controller multiplies the velocity that is asked for by it, once enable_feedforward is true; a version "
+        "feedforward_gain is kV: the controller multiplies the commanded velocity by it while enable_feedforward is true; a version "
         "without this parameter has the service ~/set_feedforward_control instead. "
         f"{shared}; kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
     )
@@ -105,7 +105,7 @@ def klipper(of: Designed) -> Snippet:
 
 
 def linuxcnc(of: Designed) -> Snippet:
-    """HAL commands for a pid component; in mm as a metric configuration counts, and degrees of a rotary axis."""
+    """HAL commands for a pid component, in mm, or in degrees for a rotary axis. Raises BadInput if the limit leaves nothing for the PID."""
     loop = _unfiltered_loop(of, "linuxcnc")
     per, length = {"m": (1e-3, "mm"), "rad": (DEGREE, "deg")}.get(of.units.output, (1.0, of.units.output))
     at = of.axis
@@ -246,7 +246,7 @@ def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float
 
 
 def _gravity(of: Designed) -> str:
-    """What has to be added for an arm, if the target cannot represent it; and which gains are 0 because the data do not determine them."""
+    """The term to add for an arm, which the target cannot represent; and the gains that are 0 because the data do not determine them."""
     size, zero = of.gains.value("kCos"), of.gains.value("zero")
     arm = (
         f" It has no kCos: add {size:.4g} {of.units.input} times the cosine of the angle minus {zero:.4g} rad ({zero / DEGREE:.4g} degrees)."
@@ -257,7 +257,7 @@ def _gravity(of: Designed) -> str:
 
 
 def _unsure(of: Designed, gain: str, before: str = "") -> str:
-    """A comment on a gain that the data do not determine; before: what goes before it."""
+    """A comment on a gain that the data do not determine; before: text in front of it."""
     return f"{before}not determined by the data" if gain in of.gains.unsure else ""
 
 
@@ -281,7 +281,7 @@ def _loop(of: Designed, target: str) -> Feedback:
 
 
 def _unfiltered_loop(of: Designed, target: str) -> Feedback:
-    """The feedback for a target without a filter on the derivative; refused where it takes too much of the margins."""
+    """The feedback for a target without a low-pass on the derivative. Raises BadInput if the gain margin is too small without it."""
     loop = _loop(of, target)
     if not (loop.bare.stable and loop.bare.gain >= LEAST_GAIN):
         given = f"gain margin {loop.bare.gain:.3g} without a filter on the derivative, which {target} lacks"

@@ -1,11 +1,11 @@
 """State feedback with an observer for the sampled linear part of a model: the largest bandwidth that holds for every sample of its parameters.
 
-The plant is sampled exactly, with its delay as states (``sampled``), and an integral of the error is added. Gains come from two quadratic problems:
-the controller weighs the position's error against the voltage, the observer weighs a force at the input against the encoder's noise. Both weights are
-set by one number, a bandwidth. A controller is taken where the loop, broken at the voltage, has the margins of ``feedback`` for every sample of the
-parameters, with the slowest observer that has them: a faster one gives back the margins of the state feedback (loop transfer recovery), and lets
-more of the encoder's noise through. Source: Astrom & Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997, ch. 11 (LQG); Anderson &
-Moore, Optimal Control: Linear Quadratic Methods, Prentice Hall 1990, ch. 8.
+The plant is sampled exactly, with its delay as states (``sampled``). Gains come from two quadratic problems: the controller weighs the position's
+error against the voltage, the observer weighs a force at the input against the encoder's noise. One number, the bandwidth, sets both weights. The
+observer's estimate of the force is the integral of the error. The loop, broken at the voltage, has the margins of ``feedback`` for every sample of
+the parameters. Of the observers with these margins the slowest is used: a faster one recovers more of the margins of the state feedback (loop
+transfer recovery), but passes more of the encoder's noise. Source: Astrom & Wittenmark, Computer-Controlled Systems, 3rd ed., Prentice Hall 1997,
+ch. 11 (LQG); Anderson & Moore, Optimal Control: Linear Quadratic Methods, Prentice Hall 1990, ch. 8.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from xy_sysid.control_design.sampled import Sampled, grid, on_grid, response_of
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
-STEPS = 24  # bandwidths that are tried
-FASTER = (3.0, 5.0, 8.0, 12.0, 20.0)  # times the controller's bandwidth: the observer's, so that what it does not know yet is gone first
+STEPS = 24  # number of bandwidths to test
+FASTER = (3.0, 5.0, 8.0, 12.0, 20.0)  # observer's bandwidth over the controller's, so that its estimation error decays first
 TOP = 0.45  # of the sampling rate, for the observer's bandwidth
-INTEGRAL = 4.0  # times below the bandwidth where the integral begins
+INTEGRAL = 4.0  # bandwidth over the corner frequency of the integral
 
 
 @dataclass(frozen=True, slots=True)
 class StateFeedback:
-    """z+ = free z + b (path - encoder) + drive held, u = c z, held = u as far as the drive gives it: observer and state feedback in one system.
+    """z+ = free z + b (path - encoder) + drive held, u = c z, held = u within the drive's limit: observer and state feedback in one system.
 
-    What an encoder shows makes the voltage of the next sample: one period of calculation is part of the design.
-    The observer hears of the voltage that is held, so it does not wind up. Within the limit z+ = a z + b (path - encoder).
+    An encoder reading determines the voltage of the next sample: one period of calculation is part of the design.
+    The observer uses the limited voltage, so it does not wind up. Within the limit z+ = a z + b (path - encoder).
 
-    free: (n, n); b, c, drive: (n,); sampling_rate: Hz; bandwidth: rad/s that the weights were set by
-    nominal, worst: margins of the loop broken at the voltage, of the model and the least over the samples; count: of these
-    rejects: m, the largest position error after a step of load of 1 V; settles: s until a tenth of it is left
+    free: (n, n); b, c, drive: (n,); sampling_rate: Hz; bandwidth: rad/s, which sets the weights
+    nominal, worst: margins of the loop broken at the voltage, of the model, and the least over ``count`` samples
+    rejects: m, the largest position error after a step of load of 1 V; settles: s until it stays below a tenth of that
     """
 
     free: FloatArray
@@ -66,9 +66,9 @@ class StateFeedback:
 
 
 def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = USUAL) -> StateFeedback:
-    """The controller of the largest bandwidth, or of that which is asked for, whose margins hold for every sample of the parameters.
+    """The controller of the largest (or requested) bandwidth whose margins hold for every sample of the parameters.
 
-    Raises BadInput where gain or pole are not determined by the data, or where no bandwidth has the margins.
+    Raises BadInput if the data do not determine gain or pole, or if no bandwidth keeps the margins.
     """
     systems = loop_systems(model, sampling_rate)
 
@@ -76,7 +76,7 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = US
         for tried, faster in itertools.product(asked.tries(sampling_rate, STEPS), FASTER):
             try:
                 free, b, c, drive = _designed(systems[0], TURN * tried, faster)
-            except np.linalg.LinAlgError:  # so far apart from the plant that the quadratic problem has no answer in double precision
+            except np.linalg.LinAlgError:  # the Riccati equation has no solution in double precision
                 continue
             yield _Design(TURN * tried, (free, b, c, drive), (free + np.outer(drive, c), b, c))
 
@@ -111,8 +111,8 @@ class _Design(NamedTuple):
 def _designed(system: Sampled, bandwidth: float, faster: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """(free, b, c, drive) of the controller: its states are the observer's, which follow the encoder's error, and the integral of that error.
 
-    The error's dynamics are those of the plant, as a constant path is an equilibrium. A force at the input is part of what is observed, and is
-    taken from the voltage: that is the integral. faster: the observer's bandwidth over ``bandwidth``, rad/s
+    The error's dynamics are those of the plant, as a constant path is an equilibrium. The observer estimates a force at the input, and the
+    voltage compensates it: this is the integral. faster: the observer's bandwidth over ``bandwidth``, rad/s
     """
     plant, into, shown = system.whole_system()
     n, h = into.size, 1.0 / system.sampling_rate
@@ -128,7 +128,7 @@ def _designed(system: Sampled, bandwidth: float, faster: float) -> tuple[FloatAr
     noise[n, n] = slow**2
     watching = min(faster * bandwidth, 2.0 * math.pi * TOP * system.sampling_rate)
     correct = _observer(whole, seen, noise, _size(system, watching) ** 2)
-    on_the_way = float(np.sum(feed[system.old.size :]))  # at rest the voltages that the delay holds are those that balance the force
+    on_the_way = float(np.sum(feed[system.old.size :]))  # at rest the delayed voltages balance the force
     gains = np.concatenate((feed, [1.0 + on_the_way]))
     drive = np.concatenate((into, [0.0]))
     return whole - np.outer(correct, seen), -correct, -gains, drive
@@ -146,13 +146,13 @@ def _regulator(a: FloatArray, b: FloatArray, states: FloatArray, voltage: float)
 
 
 def _observer(a: FloatArray, c: FloatArray, forces: FloatArray, noise: float) -> FloatArray:
-    """(n,) gains of the steady Kalman predictor."""
+    """(n,) gains of the stationary Kalman predictor."""
     p = scipy.linalg.solve_discrete_are(a.T, c[:, None], forces, np.array([[noise]]))
     return np.asarray((a @ p @ c) / (noise + c @ p @ c))
 
 
 def _margins(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> Margins:
-    """Of the loop, broken at the voltage."""
+    """Margins of the loop, broken at the voltage."""
     own = response_of(a, b, c, 0.0, grid(system), system.sampling_rate)
     poles = np.linalg.eigvals(closed_loop(system, a, b, c)).astype(np.complex128)
     return margins_of(on_grid(system) * own, grid(system), poles)
@@ -165,7 +165,7 @@ def closed_loop(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) ->
 
 
 def _load_step(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[float, float]:
-    """The largest error after a step of 1 V of load, m, and when a tenth of it is left for good, s."""
+    """The largest error after a step of 1 V of load, m, and the time until it stays below a tenth of that, s."""
     move = closed_loop(system, a, b, c)
     push = np.zeros(move.shape[0])
     push[: system.old.size] = system.old + system.new

@@ -37,7 +37,7 @@ class Controller:
 
 C_SOURCE = """\
 /* State feedback with an observer: {title}
-   error: path minus encoder, once every {period:.9g} s; z: {n} + 1 numbers, 0 at the begin
+   error: path minus encoder, once every {period:.9g} s; z: {n} + 1 numbers, 0 at the start
    feedforward: of the path, for the next period
    the answer is the sum of feedback and feedforward within the limit, to be written one period later, and held for one */
 static const double FREE[] = {{{free}}};

@@ -1,4 +1,4 @@
-"""The frame of one sample of an axis model, and the four ways in which it moves: free, with bristles, with dry friction, and without any force."""
+"""Templates of one sample of an axis model: the frame, and the motion with drag (FREE), without (PLAIN), with bristles, and with dry friction."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The text of one sample of an axis model, written from the laws of its effects.
 
-The same lines are compiled here with every effect of the library behind a flag (``sample_step``), and printed for one model in other
-languages with its effects and numbers alone (``to_c`` and the like). So they use numbers, loops and flat arrays only, and a printed
-simulation is this one. The axis is where its own motion brings it; in ``axis.model`` it is where the recording says.
+The same lines are compiled here with every effect of the library behind a flag (``sample_step``), and printed in other languages with the
+effects and numbers of one model (``to_c`` and the like). So they use numbers, loops and flat arrays only, and a printed simulation equals this
+one. Laws that depend on position use the simulated position; in ``axis.model`` they use the recorded one.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class StepText(LawText):
         """Source of ``name(u, p, on, z, a, still, s, w)``, or for one model of ``name(u, a, still, s, w)``: the position shown after the sample.
 
         u: voltage to be held for the sample, V; p: the library's parameters; on: flags of effects; z: ``NUMBERS``; a, still: generators of the
-        moving and the sticking axis, in one row; s: the state, which moves on; w: room for ``TERMS`` n numbers
+        moving and the sticking axis, by rows; s: the state, which is updated; w: scratch array of ``TERMS`` n numbers
         """
         at = self.layout
         return TEMPLATE.substitute(
@@ -129,14 +129,14 @@ class StepText(LawText):
 
 
 def heeds(model: AxisModel) -> bool:
-    """Whether a law needs sub-steps: it asks for speed, place or time, or has a state."""
+    """Whether a law needs sub-steps: it depends on speed, position or time, or has a state."""
     effects = [model.library[name] for name, _ in model.effects]
     asks = {word for effect in effects if effect.category in ("force", "state") for item in effect.functions.values() for word in arguments(item)}
     return any(heeds_speed(effect) or effect.category in ("state", "friction", "bristle") for effect in effects) or bool({"x", "t", "v"} & asks)
 
 
 def _filled(template: str, words: dict[str, str], parts: dict[str, list[str]]) -> list[str]:
-    """The lines of a template; a part takes a line of its own, with its indentation, or leaves none."""
+    """The lines of a template; each line of a part gets the indentation of its name, and an empty part gives no line."""
     lines: list[str] = []
     for line in template.format(**words, **{name: f"\0{name}" for name in parts}).split("\n"):
         indent, _, name = line.partition("\0")

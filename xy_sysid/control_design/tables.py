@@ -1,4 +1,4 @@
-"""Tables for a drive: dry friction by speed; force, drag and scale error by position; and the error that remains with each."""
+"""Tables for a drive: dry friction by speed; force, drag, gain and scale error by position; and the error that remains with each."""
 
 from __future__ import annotations
 
@@ -21,12 +21,10 @@ SPEEDS = 13  # in each direction
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """A correction table: values to add to the command, or to subtract from the encoder, by position or speed.
+    """A correction table by position or speed; ``meaning`` says how to use it.
 
-    name: ``friction``, ``force``, ``drag``, ``gain``, ``scale``, or ``residual`` (measured); at: (n,) places, m, or speeds, m/s
-    value, low, high: (n,) with their 95 % intervals
-    at_unit, unit: of the axis, SI; meaning: how it is used
-    before: rms of the correction; after: rms of half of its 95 % interval, the error that remains
+    name: ``friction``, ``force``, ``drag``, ``gain``, ``scale``, or ``residual`` (measured); at: (n,) positions, m, or speeds, m/s
+    value, low, high: (n,) the correction and its 95 % interval; at_unit, unit: of ``at`` and ``value``, SI
     """
 
     name: str
@@ -40,16 +38,16 @@ class Correction:
 
     @property
     def before(self) -> float:
-        """rms without it, in ``unit``."""
+        """rms error without the table, in ``unit``."""
         return float(np.sqrt(np.mean(self.value**2)))
 
     @property
     def after(self) -> float:
-        """rms error with the table, from the uncertainty of the parameters, in ``unit``; for 1 standard error, not 2."""
+        """rms error with the table, in ``unit``: one standard error, a quarter of the 95 % interval."""
         return float(np.sqrt(np.mean((0.25 * (self.high - self.low)) ** 2)))
 
     def csv(self) -> str:
-        """With a header that names the units; read by any program."""
+        """The table as CSV, with the units in its header."""
         first = "speed" if self.name == "friction" else "position"
         rows = [f"{first}_{_plain(self.at_unit)},{self.name}_{_plain(self.unit)},low,high"]
         rows += [f"{a:.9g},{b:.7g},{c:.7g},{d:.7g}" for a, b, c, d in zip(self.at, self.value, self.low, self.high, strict=True)]
@@ -57,7 +55,7 @@ class Correction:
 
 
 def friction_table(model: PhysicalModel, top: float) -> Correction | None:
-    """Dry friction in the sense of the motion, by speed up to ``top``, m/s, both ways; None of an axis without any."""
+    """Dry friction, signed, by speed from -``top`` to ``top``, m/s; None without dry friction."""
     if not any(of_category(model.model, "friction", "bristle")):
         return None
     positive = np.concatenate(([0.0], np.geomspace(1e-3 * top, top, SPEEDS)))
@@ -75,7 +73,7 @@ def friction_table(model: PhysicalModel, top: float) -> Correction | None:
 
 
 def position_tables(model: PhysicalModel, travel: tuple[float, float]) -> tuple[Correction, ...]:
-    """By position over the travel, m: force, drag, gain and scale error, of those that the model has."""
+    """The tables of force, drag, gain and scale error over the travel, m, as far as the model has them."""
     places = _places(model.model, travel)
     kinds: tuple[tuple[str, str, str, Callable[[AxisModel], bool]], ...] = (
         ("force", "V", "add to the command at this position", _has_force),
@@ -113,7 +111,7 @@ def _has_scale(model: AxisModel) -> bool:
 
 
 def _places(model: AxisModel, travel: tuple[float, float]) -> FloatArray:
-    """Places over the travel, so dense that the shortest period has enough of them."""
+    """(n,) positions over the travel, m, with ``ROWS_OF_A_PERIOD`` in the shortest period."""
     periods = [dict(zip(model.library[name].names, values, strict=True)).get("period", math.inf) for name, values in model.effects]
     periods += [2.0 * math.pi for name, _ in model.effects if model.library[name].angular]
     way = travel[1] - travel[0]

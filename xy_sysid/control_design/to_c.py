@@ -1,4 +1,4 @@
-"""The program in C99, without dependencies but the mathematical library: simulation and feedforward, sample by sample."""
+"""The program in C99, which needs only the standard math library: simulation and feedforward, sample by sample."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class CPrinter(Printer):
         return f"{array}[{self.expression(index)}]"
 
     def arithmetic(self, node: ast.BinOp) -> str:
-        """A quotient is never one of whole numbers, which C would round."""
+        """Quotients are of doubles: C would truncate those of integers."""
         if isinstance(node.op, ast.Div):
             return f"((double){self.expression(node.left)} / {self.expression(node.right)})"
         return super().arithmetic(node)
@@ -137,7 +137,7 @@ class CPrinter(Printer):
 
 
 def _loaded(node: ast.expr) -> ast.expr:
-    """The same place to be read."""
+    """The same expression in load context."""
     made = ast.parse(ast.unparse(node), mode="eval").body
     assert isinstance(made, ast.expr)
     return made
@@ -156,7 +156,10 @@ def functions(of: Program) -> str:
 
 
 def source(of: Program, name: str, title: str) -> tuple[str, str]:
-    """(header, source) with the functions ``NAME_reset``, ``NAME_step`` and ``NAME_feedforward``; title: for the comment at the head."""
+    """(header, source) with the functions ``NAME_reset``, ``NAME_step`` and ``NAME_feedforward``; title: for the first comment.
+
+    Raises BadInput for a name that is not an identifier.
+    """
     if not name.isidentifier():
         raise BadInput("name", repr(name), "a name in C", "Choose another.")
     arrays = "\n".join(

@@ -1,4 +1,4 @@
-"""The program as MATLAB functions in one file, for a MATLAB Function block or a script; arrays that a function changes are given back."""
+"""The program as MATLAB functions in one file, for a MATLAB Function block or a script; a function returns the arrays that it changes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class MatlabPrinter(Printer):
         self.out = 0
 
     def _changes(self, node: ast.FunctionDef) -> list[str]:
-        """Arrays among the arguments that are written to, here or by what is called."""
+        """Arrays among the arguments that the function, or a function that it calls, writes to."""
         found = {
             item.value.id
             for item in ast.walk(node)
@@ -55,7 +55,7 @@ class MatlabPrinter(Printer):
         return [argument.arg for argument in node.args.args if argument.arg in found and argument.arg in ARRAYS]
 
     def _handed(self, node: ast.Call) -> list[tuple[str, ast.expr]]:
-        """(argument of the called function, what is given for it) of the arrays that it changes."""
+        """(parameter, argument) for each array that a call changes."""
         called = node.func.id if isinstance(node.func, ast.Name) else ""
         pairs = zip(self.given.get(called, []), node.args, strict=False)
         return [(name, value) for name, value in pairs if name in self.changed.get(called, [])]
@@ -147,7 +147,7 @@ def _listed(names: list[str]) -> str:
 
 
 def source(of: Program, name: str, title: str) -> str:
-    """A file NAME.m: [y, state] = NAME(state, u) is one sample; NAME('reset') gives a state at rest, NAME('input', state, r, v, a) a feedforward."""
+    """A file NAME.m: NAME('reset') is a state at rest, NAME('step', state, u) one sample, NAME('input', state, r, v, a) the feedforward."""
     printer = MatlabPrinter(of.functions)
     for item in of.functions:
         printer.function(item)

@@ -1,4 +1,4 @@
-"""The program in Python, without dependencies: the same functions as they stand, and two classes around them."""
+"""The program in Python, without dependencies: its functions unchanged, and two classes that call them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def source(of: Program, title: str) -> str:
 import math
 
 RATE = {of.rate!r}  # Hz: one call a sample
-AHEAD = {of.ahead!r}  # s by which a path is looked at ahead
+AHEAD = {of.ahead!r}  # s, preview of the path
 {arrays}
 
 
@@ -36,7 +36,7 @@ class Axis:
 
 
 class Feedforward:
-    """What brings the axis along a path; position, speed and acceleration are those of the path AHEAD seconds later."""
+    """The input that moves the axis along a path; position, speed and acceleration are those of the path AHEAD seconds later."""
 
     def __init__(self):
         self.s, self.w = [0.0] * {of.states}, [0.0] * {of.room}

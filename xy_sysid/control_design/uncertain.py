@@ -1,7 +1,7 @@
-"""Numbers derived from the parameters of a model, with intervals from those of the parameters.
+"""Numbers derived from the parameters of a model, with intervals propagated from those of the parameters.
 
-Each parameter is moved to both ends of its 95 % interval, one at a time, and the changes add as independent ones do (JCGM 100:2008, sec. 5.1). The
-parameters of a fit are correlated; where their errors cancel, as those of gain and pole do in kA, the interval is wider than it had to be.
+Each parameter is moved to both ends of its 95 % interval, one at a time, and the changes add as independent ones (JCGM 100:2008, sec. 5.1). The
+parameters of a fit are correlated: if their errors cancel, as those of gain and pole in kA, the interval is wider than necessary.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 
-FACTOR = 2.0  # a number known to worse than this factor is said to be undetermined
+FACTOR = 2.0  # a number known to worse than this factor is undetermined
 WIDEST = math.pi / 3.0  # rad, half of the interval of an angle: 2 sin(e / 2) is 1
 WAYPOINTS = 65  # between an angle and the end of its interval: within 200 rad they are less than half a turn apart
 SKIPPED = 7  # first points of the sequence, which lie on a line
@@ -30,8 +30,8 @@ SKIPPED = 7  # first points of the sequence, which lie on a line
 class Derived:
     """A number with its 95 % interval.
 
-    unit: of the axis; because: (parameter, half of the interval that is its own), largest first; determined: False where it is known to worse
-    than a factor of two (an angle: 60 degrees) or where a parameter that it needs has no interval; meaning: in words
+    unit: of the axis; because: (parameter, half-width of the interval due to it), largest first; determined: False if it is known to worse
+    than a factor of two (an angle: 60 degrees) or if a parameter that it needs has no interval; meaning: in words
     """
 
     name: str
@@ -53,7 +53,7 @@ class Derived:
 
 
 def derive(model: PhysicalModel, name: str, unit: str, meaning: str, of: Callable[[AxisModel], float], angle: bool = False) -> Derived:
-    """The number ``of`` the model, with its interval; angle: whether it is one, in rad, which jumps by a turn somewhere."""
+    """The number ``of`` the model, with its interval; angle: True for an angle, rad, which is unwrapped over the interval."""
     value, low, high, parts = _moved(model, lambda item: np.array([of(item)]), WAYPOINTS if angle else 2)
     parts.sort(key=lambda item: -item[1])
     first, down, up = float(value[0]), float(value[0] - low[0]), float(value[0] + high[0])
@@ -77,7 +77,7 @@ def derive_row(model: PhysicalModel, of: Callable[[AxisModel], FloatArray]) -> t
 
 
 def is_determined(value: float, low: float, high: float) -> bool:
-    """Whether a number other than 0 is known to a factor of two, and its sign with it."""
+    """Whether a number is known to a factor of two, with its sign; an exact 0 always is."""
     if value == 0.0:
         return True
     near, far = sorted((abs(low), abs(high)))
@@ -85,18 +85,18 @@ def is_determined(value: float, low: float, high: float) -> bool:
 
 
 def is_known_angle(low: float, high: float) -> bool:
-    """Whether compensation with an angle from this interval, rad, reduces the force. With an angle that is wrong by e, 2 sin(e / 2) of it remain."""
+    """Whether compensation with an angle from this interval, rad, reduces the force: an error e of the angle leaves 2 sin(e / 2) of it."""
     return 0.5 * (high - low) < WIDEST
 
 
 def undetermined(model: PhysicalModel, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of some parameters whose size the data do not determine; all of them where no interval is known."""
+    """Those of the named parameters that the data do not determine, or whose interval is unknown."""
     known = {item.name: item for item in model.parameters}
     return tuple(name for name in names if name not in known or not is_determined(known[name].value, known[name].low, known[name].high))
 
 
 def with_values(model: AxisModel, values: dict[str, float]) -> AxisModel:
-    """The model with some parameters changed; per-recording values go, as the changed model is of none of them."""
+    """The model with some parameters changed, without per-recording values, which belong to the fitted model."""
     effects = tuple(
         (name, tuple(values.get(f"{name}.{key}", value) for key, value in zip(model.library[name].names, row, strict=True)))
         for name, row in model.effects
@@ -106,7 +106,7 @@ def with_values(model: AxisModel, values: dict[str, float]) -> AxisModel:
 
 
 def later(model: PhysicalModel, seconds: float) -> PhysicalModel:
-    """The model with so much more delay, and its interval with it: the axis as a controller meets it that calculates for so long."""
+    """The model with this much more delay, also in the interval of the delay: the axis together with the calculation time of a controller."""
     known = tuple(
         replace(item, value=item.value + seconds, low=item.low + seconds, high=item.high + seconds) if item.name == "delay" else item
         for item in model.parameters
@@ -117,7 +117,7 @@ def later(model: PhysicalModel, seconds: float) -> PhysicalModel:
 def samples(model: PhysicalModel, count: int) -> tuple[AxisModel, ...]:
     """The model, and ``count`` more whose parameters lie within their 95 % intervals: evenly, by a Halton sequence (Halton 1960).
 
-    Raises BadInput where a parameter of the base has no finite interval: then there is no worst case.
+    Raises BadInput if a parameter of the base has no finite interval: then there is no worst case.
     """
     known = model.parameters
     for item in known:
@@ -140,7 +140,7 @@ def _drawn(known: tuple[Estimate, ...], row: FloatArray) -> Iterator[tuple[str, 
 def _moved(
     model: PhysicalModel, of: Callable[[AxisModel], FloatArray], steps: int = 2
 ) -> tuple[FloatArray, FloatArray, FloatArray, list[tuple[str, float]]]:
-    """Value, how far below and above it may be, and each parameter's part (of the first number); steps: of more than 2, an angle is followed."""
+    """Value, deviations below and above it, and each parameter's part (of the first number); steps: above 2 an angle is unwrapped in these steps."""
     value = np.asarray(of(model.model), dtype=np.float64)
     below, above = np.zeros_like(value), np.zeros_like(value)
     parts: list[tuple[str, float]] = []
@@ -160,5 +160,5 @@ def _moved(
 
 
 def _allowed(name: str, value: float) -> float:
-    """Within what a model takes."""
+    """The value, or the nearest that a model accepts."""
     return max(value, 1e-9) if name == "pole" else value

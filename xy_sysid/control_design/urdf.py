@@ -7,13 +7,13 @@ import math
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design.laws import friction, largest_voltage, lost_in
 
-ENDLESS = 1e16  # m: end of a joint that has none, as URDF asks for one; SDF takes this number by default
+ENDLESS = 1e16  # m: URDF requires a limit, also of a joint without one; this is the default of SDF
 
 
 def urdf(
     model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool, name: str = "axis"
 ) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """(text, what is lost by effect); travel: m or rad, None if unknown; limit: of the drive, infinite if unknown."""
+    """(text, (effect, loss) of each that is lost); travel: m or rad, None if unknown; limit: of the drive, V, infinite if unknown."""
     level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
     lost = [(effect, lost_in("URDF", model.library[effect])) for effect, _ in model.effects]
     if model.delay > 0.0:

@@ -1,4 +1,4 @@
-"""One call: all results for a controller from a refined model."""
+"""All results for a controller from a refined model, in one call."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.samples.recording import Recording, Run, one_run
 from xy_sysid.units import Sensed
 
-CALCULATION, LONGEST_CALCULATION = 1.0, 10.0  # periods of the controller from reading to writing: of most drives, and the most that is taken
+CALCULATION, LONGEST_CALCULATION = 1.0, 10.0  # controller periods from reading to writing: of most drives, and the most accepted
 WORST_OF = 6  # samples of the parameters along a path
-CALM = 0.6  # of the fastest path's speed, for the path that tracking is compared on
-FOLLOWED = 0.2  # of the bandwidth: what of a recorded motion a loop is asked to follow
+CALM = 0.6  # of the fastest path's speed, for the path on which tracking is compared
+FOLLOWED = 0.2  # of the bandwidth: cut-off of the recorded motion that the loop has to follow
 LONGEST = 10.0  # s of a recorded motion that is followed
 Found = TypeVar("Found")
 
@@ -47,13 +47,13 @@ class Used:
     limit: V, of the drive, infinite if unknown; limit_from: its origin
     travel: m, range of tables and paths; None if unknown
     gains, friction, tables, gap: feedforward and corrections (None: the axis has none)
-    feedback, states (state feedback with an observer), modes, notch, shapers (of the lowest mode; shaper: the best), fastest: None or none where
-    there is nothing to design, or where it was refused
-    allowed: what limits the bandwidth, and what each part of the axis costs; filter, filtered: the notch or low-pass with which the loop reaches the
-    highest crossover, and that loop; None where none reaches more
-    predicted: input of the recording before and after, if there is one; tracking: simulated tracking errors
-    compensation: along the first path of ``tracking``; its laws are those that exported source undoes
-    refused: (what, why) of results without a design; not_undone: (effect, why) that the feedforward does not invert; notes: to be read first
+    feedback, states (state feedback with an observer), modes, notch, shapers (of the lowest mode; shaper: the best), fastest: None or empty if
+    there is nothing to design, or if it was refused
+    allowed: the highest crossover, and the cost of each part of the axis; filter, filtered: the notch or low-pass with which the loop reaches the
+    highest crossover, and that loop; None if none reaches more
+    predicted: input of the recording that is not predicted, if there is a recording; tracking: simulated tracking errors
+    compensation: along the first path of ``tracking``; exported source inverts its laws
+    refused: (design, why) of designs that are missing; not_undone: (effect, why) that the feedforward does not invert; notes: to be read first
     """
 
     axis: str
@@ -87,7 +87,7 @@ class Used:
 
     @property
     def in_loop(self) -> PhysicalModel:
-        """The model as the controller meets it: with the delay of the calculation."""
+        """The model with the delay of the controller's calculation."""
         return later(self.model, self.calculation / self.sampling_rate)
 
     def __repr__(self) -> str:
@@ -109,13 +109,13 @@ def use(
 ) -> Used:
     """Feedforward with intervals, correction tables, feedback with margins, filters, limits, and the benefit of each.
 
-    model: of ``refine`` or a file; data: a recording of the same machine, for a comparison on its own motion, its noise and its limit
-    rate: Hz of the controller (that of the recording, or of the one that the model was fitted to)
-    limit: V of the drive (the model's saturation, or the recording's largest voltage)
-    bandwidth: Hz, asked of the loop (the largest with the margins by default); travel: m, that tables cover (the recording's)
-    margins: phase margin, degrees, and gain margin, times, that the worst sample of the parameters has to keep (45 and 2)
+    Defaults are in brackets. model: of ``refine`` or a file; data: a recording of the same machine, for its motion, noise and limit
+    rate: Hz, of the controller (that of the recording, or of the one that the model was fitted to)
+    limit: V, of the drive (the model's saturation, or the recording's largest voltage)
+    bandwidth: Hz, crossover of the loop (the largest with the margins); travel: m, range of tables and paths (the recording's)
+    margins: phase margin, degrees, and gain margin, factor, that the worst sample of the parameters has to keep (45 and 2)
     calculation: periods of the controller from reading the encoder to writing the voltage, in margins and simulations (1: written in the next cycle)
-    Raises BadInput for a transfer function, or values out of range. What cannot be designed safely is in ``refused``.
+    Raises BadInput for a transfer function, or values out of range. Designs that miss the margins are in ``refused``.
     """
     if not isinstance(model, PhysicalModel):
         raise BadInput("model", type(model).__name__, "a model with physical effects", "Make one with refine, or xy-sysid refine --model.")
@@ -131,7 +131,7 @@ def use(
     late = later(model, wait)
     drive, drive_from = _limit(model, run, limit)
     sensed = model.units.sensed if run is None else run.measured
-    placed = run if sensed == "position" else None  # the integral of a speed drifts, and is no place
+    placed = run if sensed == "position" else None  # the integral of a speed drifts, so it is no position
     between = travel or (None if placed is None else (float(np.min(placed.position)), float(np.max(placed.position))))
     if between is not None and not between[0] < between[1]:
         raise BadInput("travel", f"{between[0]:g} to {between[1]:g}", "two places, the lower first", "Give --travel LOW HIGH.")
@@ -160,7 +160,7 @@ def use(
             calm = Bounds(CALM * quick.bounds.speed, CALM**2 * quick.bounds.acceleration, CALM**3 * quick.bounds.jerk)
             paths.append(("S-curve over the travel", s_curve(ends, calm, rate)))
         if run is not None and run.sampling_rate == rate:
-            edge = max(int(EDGE * len(run)), 1)  # what the low-pass makes of both ends is no motion of the machine
+            edge = max(int(EDGE * len(run)), 1)  # the low-pass distorts both ends
             whole = recorded(run.position, rate, FOLLOWED * loop.bandwidth)
             paths.append(("the recorded motion", whole.part(edge, min(len(run) - edge, edge + round(LONGEST * rate)))))
         slow = samples(late, WORST_OF)
@@ -198,7 +198,7 @@ def use(
 
 
 def _tried(what: str, make: Callable[[], Found], refused: list[tuple[str, str]]) -> Found | None:
-    """The result; or None, and why among the refusals."""
+    """The result; None if it raises BadInput, whose text is added to ``refused``."""
     try:
         return make()
     except BadInput as problem:
@@ -220,7 +220,7 @@ def _limit(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[
 
 
 def _placed(model: PhysicalModel, sensed: Sensed) -> PhysicalModel:
-    """The model, for a position loop. Raises BadInput where no position is measured."""
+    """The model, for a position loop. Raises BadInput if no position is measured."""
     if sensed != "position":
         given = f"of an axis whose {sensed} is measured, and no position"
         raise BadInput("position loop", given, "a measured position", "Close a velocity loop in the drive, or measure the position too.")
@@ -238,7 +238,7 @@ def _rate(model: PhysicalModel, run: Run | None, given: float | None) -> tuple[f
 
 
 def _gap(model: PhysicalModel) -> Derived | None:
-    """The free play of an effect that has one, as a correction by direction."""
+    """The gap of an effect that has one, as a correction by direction."""
     for name, _ in model.model.effects:
         places = [k for k, item in enumerate(model.model.library[name].parameters) if item.name == "gap"]
         if places:

@@ -21,19 +21,19 @@ from xy_sysid.greybox.floor import TOP, TOP_SHARE, count_size, encoder_noise
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
 
-HEARD = 0.05  # of the voltage's rms: what encoder noise may make of a predicted voltage
+HEARD = 0.05  # of the voltage's rms: largest contribution of encoder noise to a predicted voltage
 HIGHEST, LOWEST = 0.05, 0.005  # of the sampling rate: bounds of the frequency below which voltages are compared
-WIDER = 4.0  # times as high is where the motion is cut, so that its reversals stay where they are
-EDGE = 0.02  # of the recording at each end that a filter without delay spoils
+WIDER = 4.0  # cut-off of the motion over that of the voltages, so that its reversals keep their times
+EDGE = 0.02  # of the recording at each end, which a zero-phase filter distorts
 
 
 @dataclass(frozen=True, slots=True)
 class Predicted:
     """The recorded voltage compared with the feedforward of the recorded motion.
 
-    below: Hz, the part of both that is compared; voltage: rms of what was recorded, V
-    rms of the input, V, that a feedforward does not predict. inertia: with kV and kA; simple: with kS and kG too; whole: with every law
-    tabled: with the measured table too, each half by that of the other; None without one
+    below: Hz, highest frequency that is compared; voltage: rms of the recorded voltage, V
+    The others are rms, V, of the input that a feedforward does not predict. inertia: without kS; simple: with kS too; whole: with every law
+    tabled: with the measured table too, each half with the table of the other half; None without one
     """
 
     below: float
@@ -46,9 +46,9 @@ class Predicted:
 
 @dataclass(frozen=True, slots=True)
 class Tracking:
-    """Tracking errors, m rms, in the simulation of the refined model under the same feedback: of what the axis carries, behind gap and scale error.
+    """Simulated tracking errors of the load, m rms, behind gap and scale error, under the same feedback.
 
-    path: in words; feedback, simple, whole, compensated: alone, with kS, kV and kA, with every law undone, with those that are worth undoing
+    path: in words; feedback, simple, whole, compensated: alone, with kS, kV and kA, with every law inverted, with the laws whose inversion helps
     worst: of the compensated axis over samples of its parameters; largest: V, the largest voltage of any of them; limit: V
     undone, left: laws that the compensation inverts, and (law, why) of the others
     """
@@ -73,7 +73,7 @@ def encoder_of(run: Run) -> Encoder:
 
 
 def encoder_of_floor(noise_floor: float, sampling_rate: float) -> Encoder:
-    """White noise of an encoder that makes a noise floor, m/s rms, of the velocity below the highest frequency that is compared.
+    """White noise of an encoder that causes this noise floor, m/s rms, of the velocity below the highest frequency that is compared.
 
     The difference of white noise has the power density 2 (1 - cos w), w = 0 .. pi.
     """
@@ -82,7 +82,7 @@ def encoder_of_floor(noise_floor: float, sampling_rate: float) -> Encoder:
 
 
 def predicted(model: PhysicalModel, found: Gains, run: Run, table: MeasuredTable | None = None) -> Predicted:
-    """The voltage of a run from its motion; table: of what the model leaves of this run. Raises BadInput where the run is too short."""
+    """The voltage of a run from its motion; table: of the residual input of this run. Raises BadInput if the run is too short."""
     below = clear_below(model, run)
     path = recorded(run.position, run.sampling_rate, WIDER * below)
     sos = scipy.signal.butter(ORDER, below, fs=run.sampling_rate, output="sos")
@@ -92,7 +92,7 @@ def predicted(model: PhysicalModel, found: Gains, run: Run, table: MeasuredTable
         return np.asarray(scipy.signal.sosfiltfilt(sos, voltage)[edge:-edge])
 
     wanted = heard(run.voltage)
-    early = path.ahead(model.model.delay + 0.5 / run.sampling_rate)  # each is given the delay: it is their laws that are compared
+    early = path.ahead(model.model.delay + 0.5 / run.sampling_rate)  # all get the same delay: only their laws are compared
     whole = feedforward(model.model, path).voltage
     tries = [simple_feedforward(found, early, False), simple_feedforward(found, early), whole]
     tries += [] if table is None else [whole + table.of_other_half(path)]
@@ -108,10 +108,10 @@ def predicted(model: PhysicalModel, found: Gains, run: Run, table: MeasuredTable
 
 
 def clear_below(model: PhysicalModel, run: Run) -> float:
-    """Hz: below it the sensor's noise makes little of a voltage that is calculated from the measured motion."""
+    """Hz: below it the sensor's noise adds at most ``HEARD`` to a voltage that is calculated from the measured motion."""
     noise, size = encoder_noise(run.sampling_rate, run.position, run.measured, run.voltage), float(np.std(run.voltage))
     own = abs(model.model.gain * model.model.pole)
-    allowed = HEARD * size * own / max(noise, 1e-300)  # rad/s to the power of how often the acceleration differentiates what is measured
+    allowed = HEARD * size * own / max(noise, 1e-300)  # (rad/s)^times
     times = {"position": 2, "velocity": 1, "acceleration": 0}[run.measured]
     top = allowed ** (1.0 / times) / (2.0 * np.pi) if times else math.inf
     return float(np.clip(top, LOWEST * run.sampling_rate, HIGHEST * run.sampling_rate))

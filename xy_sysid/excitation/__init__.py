@@ -2,11 +2,11 @@
 
 ``signal(settings, rate).next(n)`` returns the following samples; any chunking gives the same stream, bit for bit.
 
-    contract:                                      what every signal is
+    contract:                                      the interface of every signal
     multisine, sweep, stepped, noise, prbs, pulse: one kind of signal per file
     drive:                                         from a signal to the applied voltage: ramps, centring, limits
     trajectory, motion_plan, trajectory_drive:     a motion within limits of position, speed and acceleration, in pieces that end at rest
-    motion_check:                                  whether the motion of each axis fits its voltage
+    motion_check, sign_check, following:           whether the motion of each axis fits its voltage or reference
     travel_limits:                                 keeps axes away from the ends of travel
     designed:                                      an experiment from a file, within the machine's own limits
     pacing:                                        when the next block is due
@@ -40,7 +40,7 @@ MAKERS: dict[str, Maker] = {
 
 
 def signal(settings: AxisExcitation, rate: float) -> Signal:
-    """The stream that these settings describe, at ``rate`` samples per second.
+    """The stream of these settings at a rate, Hz.
 
     Raises BadInput if the band or the period does not fit the rate.
     """

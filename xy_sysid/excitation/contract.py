@@ -1,4 +1,4 @@
-"""The interface of every excitation signal, and two implementations: a table that repeats, and a stream of parts."""
+"""The interface of every excitation signal, and two implementations: a repeated table, and a stream of parts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Periodic:
 
 @dataclass(slots=True)
 class Parts:
-    """A stream cut from the arrays that an endless iterator yields; holds one array at a time."""
+    """A stream from the arrays of an endless iterator; stores one array at a time."""
 
     parts: Iterator[FloatArray]
     _left: FloatArray

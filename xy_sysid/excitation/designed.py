@@ -24,9 +24,9 @@ AGAIN = "Design it again within these limits: xy-sysid next with --params."
 class Needs:
     """The requirements of an experiment on its axis.
 
-    voltage: the largest input; travel: the expected positions, with margin, for a start at ``start``, where the axis stood at design
-    reach: the expected motion without margin, relative to its start; within: the ends of travel given to the design
-    speed, acceleration: the largest expected, with margin
+    voltage: the largest input; travel: (low, high) expected positions, with margin, for a start at ``start``, the position at design
+    reach: (low, high) expected motion without margin, relative to its start; within: the ends of travel in the design
+    speed, acceleration: the largest expected, with margin; all in the units of the axis
     """
 
     voltage: float
@@ -156,11 +156,11 @@ class Lasting(Protocol):
 
     @property
     def ramp(self) -> float:
-        """s in which it fades in."""
+        """Fade-in, s."""
 
     @property
     def seconds(self) -> float:
-        """Of motion."""
+        """Duration of the motion, s."""
 
 
 def document_of(axis: str, rate: float, experiment: Lasting, needs: Needs, units: Units = USUAL) -> dict[str, Any]:

@@ -38,7 +38,7 @@ LIVE_AXIS = frozenset({"rms", "limit", "offset", "centring", "travel_min", "trav
 LIVE = frozenset({"duration", "watchdog", "abort_ramp", "patience"})
 
 STOP_RAMP = 0.1  # maximum s of the fade-out at STOP, for any abort_ramp
-AHEAD = 1.0  # s by which a stamp may be ahead of the commands; their thread may have been delayed
+AHEAD = 1.0  # s by which a stamp may be ahead of the commands, whose thread may be delayed
 ABSURD = 10.0  # a position further than this many travel ranges from the middle is an encoder fault
 
 
@@ -60,7 +60,7 @@ class Report:
 class Drive:
     """The voltage of all axes, block by block.
 
-    settings: what to apply; seq: counter of the first sample; watched: stop if motion and voltage do not match (False for
+    settings: of the excitation; seq: counter of the first sample; watched: stop if motion and voltage do not match (False for
     recordings of a simulated machine); starts: allowed start positions of an experiment. Raises BadInput if a signal does not fit the rate.
     """
 
@@ -149,7 +149,7 @@ class Drive:
     def see(self, block: Block, overdue: int = 0) -> bool:
         """Read positions, (n, axes) in m; returns False if they are not usable (``unusable`` gives the reason).
 
-        overdue: samples that are due but not sent yet because this computer was delayed; a position may be from any time since then
+        overdue: samples that are due but not sent yet because this computer was delayed; a position may be ahead by these
 
         The drive stops on motion that the voltage cannot have caused, and on missing motion.
         """
@@ -263,7 +263,7 @@ class Drive:
             self.stop(reason, self.settings.abort_ramp)
 
     def skip(self, n: int) -> None:
-        """Let n samples of time pass without a voltage, after a delay of the caller; a controller holds the last command."""
+        """Skip n samples after a delay of the caller; a controller holds the last command meanwhile."""
         if n > 0 and self.settings.output == "commands" and self._last is not None:
             self._travel.sent(self.seq, np.tile(self._last, (n, 1)))
             self._motion.sent(self.seq, np.tile(self._last, (n, 1)))
@@ -275,7 +275,7 @@ class Drive:
                 stream.next(n)
 
     def catch_up(self, missed: int) -> Block:
-        """The next sample, after ``missed`` skipped ones; a drive that knows what the controller executed meanwhile returns these samples, too."""
+        """The next sample, after ``missed`` skipped ones; a drive that knows the controller's motion meanwhile returns these samples too."""
         self.skip(missed)
         return self.next(1)
 
@@ -313,7 +313,7 @@ class Drive:
 
     @property
     def safe(self) -> FloatArray:
-        """(axes,) 0; where positions are sent, the newest measured one, or the one at the stop; NaN before the first."""
+        """(axes,) 0 V; for position commands the newest measured position, or that at the stop; NaN before the first."""
         if not self.settings.holds:
             return np.zeros(len(self.axes))
         if self._rest is not None or self._travel.seen is None:
@@ -321,7 +321,7 @@ class Drive:
         return self._travel.seen.position
 
     def _reference(self, n: int) -> FloatArray:
-        """(n, axes) positions to hold: near the start position, and the present one after a stop."""
+        """(n, axes) position commands: about the start position; after a stop they fade to the position at the stop."""
         assert self._start is not None
         wanted = np.clip(self._driven(n)[0], -self._limit, self._limit)
         self._clipped += np.sum(np.abs(wanted) == self._limit, axis=0)

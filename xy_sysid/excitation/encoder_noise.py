@@ -9,7 +9,7 @@ import scipy
 
 from xy_sysid.samples.block import FloatArray
 
-COUNTS, SIGMAS = 2.0, 9.0  # encoder counts, and standard deviations, by which two readings may differ without motion: once in months of readings
+COUNTS, SIGMAS = 2.0, 9.0  # encoder counts, and standard deviations, by which two readings differ without motion at most once in months
 MEMORY = 2000  # readings over which the noise is averaged
 BENT = 6.0  # variance of a second difference of white noise of variance 1
 THIRD = 20.0  # variance of a third difference
@@ -18,7 +18,7 @@ RISK = 1e-3  # probability that few readings underestimate the noise; SIGMAS cov
 
 
 class EncoderNoise:
-    """Estimates the noise from readings; ``still`` is the largest distance that needs no motion.
+    """Estimates the noise from readings; ``still`` is the largest difference without motion.
 
     Noise is measured with third differences of consecutive readings: constant speed or acceleration has none, and a jerk can only
     increase the estimate. A few readings may underestimate the noise; therefore ``still`` uses the upper confidence limit of the variance.

@@ -16,13 +16,13 @@ from xy_sysid.settings import ExcitationSettings
 from xy_sysid.units import bare
 from xy_sysid.units import moved as in_words
 
-FIRST, GROWS = 0.005, 1.6  # the first push as a fraction of the limit, and the factor from one push to the next
-LOUDEST = 2.0  # the last push as a multiple of rms
+FIRST, GROWS = 0.005, 1.6  # the first push as a fraction of the limit, and the factor between pushes
+LOUDEST = 2.0  # the last push as a multiple of rms, within the limit
 COUNTS, SIGMAS = 6.0, 6.0  # encoder counts, and standard deviations at rest, from which a change is motion
 LARGE, SMALL = 30.0, 0.01  # times the speed per volt expected from travel and full voltage: outside this range the unit is wrong
 CLEAR = 0.2  # of the longest push; a push must reach this to count for gain and friction: a smaller motion is elastic presliding
-NEXT = 1.5  # the next push may go this much further than in proportion
-SLOWEST = 0.1  # s of delay and lag; the travel limits look this far ahead
+NEXT = 1.5  # factor by which the motion of the next push may exceed proportionality
+SLOWEST = 0.1  # s, largest delay and lag; the travel limits look this far ahead
 HALF = 0.5  # of the push, at which the voltage counts as on
 RETURNS = 0.2  # of a push, elastic return at 0 V; with less, the axis stays where it was moved
 LOADED = "a load drives it (it hangs or tips over), so the wiring cannot be checked. Hold or balance the load, and start again"
@@ -203,9 +203,9 @@ class FirstRun:
 
 
 def _answers(place: FloatArray, begin: int, turn: tuple[int, int]) -> tuple[float, float]:
-    """m by which a push forth, which starts at ``begin``, and one back have changed the motion that was present before each.
+    """Displacements, m, of the push forth, which starts at ``begin``, and of the push back, minus the drift before each.
 
-    turn: last sample of the push forth, and first of the push back; the second half of the rest between them shows the motion there
+    turn: last sample of the push forth, and first of the push back; the second half of the rest between them shows the drift there
     """
     rested = (turn[0] + turn[1]) // 2
     before = [float(np.polyfit(np.arange(len(part)), part, 1)[0]) if len(part) > 2 else 0.0 for part in (place[:begin], place[rested : turn[1]])]
@@ -215,7 +215,7 @@ def _answers(place: FloatArray, begin: int, turn: tuple[int, int]) -> tuple[floa
 
 
 def _which_way(answer: tuple[float, float], least: float) -> str:
-    """The problem with the direction, or empty; answer: m by which a push forth and one back have changed the motion."""
+    """The problem with the direction, or empty; answer: displacements of a push forth and one back, m; least: m, the noise."""
     forth, back = answer
     if forth < -least and back > least:
         return f"plus volts move it to minus, and minus volts to plus: {SWAP}"

@@ -1,6 +1,6 @@
 """Does a joint follow the commanded position? If not, the controller does not respond, or the joint is blocked.
 
-off the way     further from the recent references than the brake zone
+off the path    further from the recent references than the brake zone
 no answer       the reference moves by a large part of its limit and the encoder reading is constant
 """
 
@@ -14,7 +14,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import ExcitationSettings
 
 MEMORY = 1.0  # s of reference and motion that are kept
-MOVES = 0.25  # of the limit: a smaller motion of the reference is not judged
+MOVES = 0.25  # of the limit: a smaller motion of the reference is not checked
 
 
 class FollowCheck:

@@ -16,11 +16,11 @@ OFTEN = 200  # blocks between two progress reports
 
 
 class Machine(Protocol):
-    """What can be driven: the simulated machine, or another that takes blocks."""
+    """A machine that can be driven: the simulated one, or another that takes blocks."""
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names, one per column."""
+        """Names of the axes, one per column."""
 
     def step(self, voltage: FloatArray) -> FloatArray:
         """(n, axes) V, held -> (n, axes) m at the same instants."""
@@ -29,7 +29,7 @@ class Machine(Protocol):
 def drive(machine: Machine, settings: ExcitationSettings, duration: float, tell: Callable[[float], None] = lambda seconds: None) -> Recording:
     """The recording of ``duration`` s of excitation; block k uses the positions of block k - ahead.
 
-    tell: called regularly with the seconds that are done
+    tell: called regularly with the elapsed s of the recording
     """
     driver = Drive(settings, watched=False)
     total = round(duration * settings.rate)

@@ -4,8 +4,8 @@ One principle: the possible motion is calculated from the volt seconds beyond ``
 per volt, and compared with the encoder. A constant encoder reading is accepted only while the axis cannot have moved far
 (STRIDE of a brake zone). Therefore friction and dead zones up to ``breakaway``, and low voltage at rest, are no faults.
 
-    a step          faster than FASTEST times what the voltage limit gives: the encoder leaps, or its scale is wrong
-    no answer       a stride was possible, and the encoder is constant, or has never shown LEAST of it or of its variation: frozen, or a wrong scale
+    a step          faster than FASTEST times the speed at the voltage limit: the encoder jumps, or its scale is wrong
+    no answer       a stride was possible, and the encoder is constant, or shows less than LEAST of it or of its variation: frozen, or a wrong scale
     the wrong way   slow motion against the voltage: a sign is wrong
     outside         beyond a limit and not coming back, or not slowed by full inward voltage
 
@@ -27,7 +27,7 @@ from xy_sysid.units import over
 
 REACTION = 0.006  # s of response time of a machine: 1.3 ms delay and 4 ms lag of a ball-screw axis
 CROSSING = 0.3  # s in which an axis of unknown gain is assumed to cross its travel at full voltage (its limit, at least FULL)
-FULL = 10.0  # V; a lower limit is taken as caution, not as a drive of lower voltage
+FULL = 10.0  # V; a lower limit counts as caution, not as a drive of lower voltage
 FASTEST = 10.0  # times that speed: no motion is faster
 MEMORY = 1.0  # s of motion that are kept
 SHORT = 0.4  # s in which a wrong sign shows in fast motion
@@ -49,7 +49,7 @@ STEADY = 0.5  # largest centring * speed per volt * age of a position; above 1.5
 
 
 def full(settings: ExcitationSettings) -> FloatArray:
-    """(axes,) V, the machine's full voltage, at least; for other commands only the limit is known."""
+    """(axes,) V, full voltage of the machine: the limit, but at least FULL if voltage is published."""
     least = FULL if settings.output == "blocks" else 0.0
     return np.array([max(a.limit, least) for a in settings.axes.values()], dtype=np.float64)
 
@@ -74,14 +74,14 @@ def age(settings: ExcitationSettings) -> float:
 
 
 def most_centring(settings: ExcitationSettings) -> FloatArray:
-    """(axes,) V/m above which the loop would oscillate, if known; inf where positions are sent, which have no centring."""
+    """(axes,) V/m above which the loop would oscillate; inf for position commands, which have no centring."""
     if settings.holds:
         return np.full(len(settings.axes), np.inf)
     return np.asarray(STEADY / (gains(settings) * age(settings)))
 
 
 def check_loop(settings: ExcitationSettings) -> None:
-    """Raises BadInput if the centring would make an axis oscillate, as far as that is known."""
+    """Raises BadInput if an axis would oscillate with its centring."""
     for (name, axis), gain, most in zip(settings.axes.items(), gains(settings), most_centring(settings), strict=True):
         if axis.centring > most:
             sent, unit = settings.units
@@ -128,7 +128,7 @@ class MotionCheck:
         self._reaction = reaction(settings)
         self._sent, self._unit = settings.units
         self._what = "voltage" if settings.output == "blocks" else settings.interface
-        self._spans = (SHORT, MEMORY) if settings.output == "blocks" else (MEMORY,)  # commands may be late, and are held where they are
+        self._spans = (SHORT, MEMORY) if settings.output == "blocks" else (MEMORY,)  # commands may be late, and the controller holds them
 
     @property
     def gain(self) -> FloatArray:
@@ -195,9 +195,9 @@ class MotionCheck:
         return self._unmoved(int(np.argmax(over)), np.ptp(self._rest, axis=0), reckoned) if over.any() else ""
 
     def _no_answer(self, place: FloatArray, could: FloatArray) -> str:
-        """Fault: a large motion was possible, and the encoder has never shown more than a negligible part; or much varied, and it hardly shows."""
+        """Fault: a large motion was possible, and the encoder has shown only a negligible part of it, or of its variation."""
         whole, ever = np.ptp(could, axis=0) * self.gain, np.ptp(self._ever, axis=0)
-        ever = np.where((place[-1] > self._high) | (place[-1] < self._low), np.inf, ever)  # that has a reason of its own
+        ever = np.where((place[-1] > self._high) | (place[-1] < self._low), np.inf, ever)  # this is reported by another check
         if (whole <= STRIDE * self._zone).all():
             return ""
         varied, followed = np.ptp(_detrended(could), axis=0) * self.gain, np.ptp(_detrended(place), axis=0)
@@ -216,9 +216,9 @@ class MotionCheck:
         )
 
     def _wrong_way(self, times: FloatArray, place: FloatArray, could: FloatArray) -> str:
-        """Fault: slow motion against the voltage. Motion in the right direction gives the estimate of the speed per volt.
+        """Fault: slow motion against the voltage. Motion in the right direction gives an estimate of the speed per volt.
 
-        Motion proportional to the voltage itself and not to its integral (a spring, a heavy mass) gives no sign.
+        Motion proportional to the voltage itself and not to its integral (a spring, a heavy mass) is not judged.
         """
         reckoned = could * self._gain
         for seconds in self._spans:

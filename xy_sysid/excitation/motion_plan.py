@@ -1,4 +1,4 @@
-"""A periodic motion from rest to rest, and from each of its samples a way to rest within the acceleration limit.
+"""A periodic motion from rest to rest, with braking from each of its samples within the acceleration limit.
 
 Braking at the acceleration limit never exceeds the position limit: the motion itself reverses before that limit with at most this
 acceleration, so there is always enough distance to stop.
@@ -45,12 +45,12 @@ class MotionPlan:
 
     @property
     def rests(self) -> int | None:
-        """Sample from which it is at rest; None while it continues."""
+        """First sample at rest; None while the motion continues."""
         return None if self._brake is None else self._brake + int(np.max(self._steps(self._brake)))
 
     @property
     def place(self) -> FloatArray | None:
-        """(axes,) final position; None while it continues."""
+        """(axes,) final position; None while the motion continues."""
         rests = self.rests
         return None if rests is None else self.at(rests, 1).position[0]
 
@@ -59,7 +59,7 @@ class MotionPlan:
         return self._points(np.arange(first, first + n), self._brake)
 
     def ahead(self, first: int, last: int) -> MotionPoints:
-        """The samples from first to last, and from there to rest: a controller can execute these without further messages."""
+        """The samples from first to last and the braking after them, so that a controller needs no further message."""
         brake = last if self._brake is None else min(last, self._brake)
         rest = brake + int(np.max(self._steps(brake)))
         return self._points(np.arange(first, max(rest, first) + 1), brake)

@@ -1,8 +1,7 @@
 """Random-phase multisine with a flat amplitude spectrum: full, odd, and odd with random detection lines.
 
-The period is a whole number of samples, so that a transform over it has no leakage. Odd multisines leave the even lines
-free: what appears there is even distortion. With one odd line of each group of four left out at random, what appears on
-those is odd distortion.
+The period is a whole number of samples, so a transform over it has no leakage. Odd multisines leave the even lines free: output
+there is even distortion. If one odd line of each group of four is left out at random, output on these lines is odd distortion.
 
 Source: R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed., sections 4.3 and 5.2.
 """
@@ -24,7 +23,7 @@ GROUP = 4  # odd lines of which one is left out
 
 @dataclass(frozen=True, slots=True)
 class MultisineLines:
-    """Which lines of the period's transform carry what; line k lies at k * rate / period.
+    """The lines of the period's transform; line k is at k * rate / period, Hz.
 
     period: samples; excited: (n,) lines with power; even, odd: lines in the band left free to detect distortion;
     crest: largest magnitude over rms

@@ -1,8 +1,8 @@
 """Band-limited Gaussian white noise: seeded white noise through two elliptic filters with a state.
 
 Measured: flat to 0.04 dB from ``low`` to ``high``; 40 dB down at 0.92 low and 1.08 high, 60 dB down from 0.90 low and 1.10
-high on, at every rate from 1 to 100 kHz. The power between the band and the stop bands counts in the rms. A few
-kilobytes of state, whatever the length.
+high on, at every rate from 1 to 100 kHz. The power between the band and the stop bands counts in the rms. The state takes a few
+kilobytes for any length.
 
 Source: elliptic design and cascaded second-order sections, A. V. Oppenheim, R. W. Schafer, "Discrete-Time Signal
 Processing", ch. 7; the random numbers are Philox, J. Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11.
@@ -22,7 +22,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation
 
 ORDER, RIPPLE_DB, STOP_DB = 10, 0.02, 60.0
-LOWEST = 1e-6  # of the rate: at a tenth of it rounding quadruples the ripple (measured)
+LOWEST = 1e-6  # of the rate, lowest cut-off: at a tenth of it rounding quadruples the ripple (measured)
 
 PIECE = 512  # samples filtered at a time: a call costs as much as 500 samples
 
@@ -46,7 +46,7 @@ def power_gain(sos: FloatArray, low: float, high: float, rate: float) -> float:
 
 @lru_cache(maxsize=32)
 def _designed(low: float, high: float, rate: float) -> tuple[FloatArray, float]:
-    """Sections (read-only) and power gain: a drive needs them again when it starts again, and its axes share a band."""
+    """Sections (read-only) and power gain, cached for the axes of a drive with the same band and for a restart."""
     sos = sections(low, high, rate)
     return sos, power_gain(sos, low, high, rate)
 

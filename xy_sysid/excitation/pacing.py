@@ -1,4 +1,4 @@
-"""When the next block is due: by the clock, or by the machine's answers. Time and answers are arguments."""
+"""The time at which the next block is due: by the clock, or by the machine's answers. Time and answers are arguments."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from xy_sysid.samples.block import Block
 
-CATCH_UP = 3  # blocks late that are still sent one after the other; after a longer stall time is skipped
+CATCH_UP = 3  # most late blocks that are sent at once; after a longer stall time is skipped
 
 
 @dataclass(slots=True)
 class Clock:
     """Block k is due at start + k * period, s of a monotonic clock; period 0 is always due.
 
-    late: blocks that came more than a period after they were due, or were skipped
+    late: number of blocks that were sent more than a period late, or skipped
     """
 
     period: float
@@ -25,13 +25,13 @@ class Clock:
     late: int = 0
 
     def due(self, now: float) -> int:
-        """Blocks due and not sent yet."""
+        """Number of blocks that are due and not sent yet; now: s."""
         if self.period == 0:
             return 1
         return max(0, int((now - self.start) / self.period) + 1 - self.sent)
 
     def skip(self, now: float) -> int:
-        """After a stall of more than CATCH_UP blocks: how many blocks of time to leave out, so that nothing bursts."""
+        """Number of blocks of time to skip after a stall of at least CATCH_UP blocks, to avoid a burst; 0 without one."""
         behind = self.due(now) - 1
         if self.period == 0 or behind < CATCH_UP:
             return 0
@@ -40,13 +40,13 @@ class Clock:
         return behind
 
     def slip(self, now: float) -> None:
-        """Move the start so that at most one block is due: for a stream that may not skip."""
+        """Move the start so that at most one block is due, for a stream that must not skip."""
         behind = self.due(now) - 1
         if self.period > 0 and behind > 0:
             self.start += behind * self.period
 
     def count(self, now: float) -> None:
-        """One block was sent."""
+        """Count one sent block."""
         if self.due(now) > 1:
             self.late += 1
         self.sent += 1
@@ -54,18 +54,18 @@ class Clock:
 
 @dataclass(slots=True)
 class Answers:
-    """Positions that came back, handed out up to a sample: in lockstep no later one may be used, however it was sent."""
+    """Received positions, returned up to a sample: in lockstep no later position may be used."""
 
     _given: float = -1.0
     _blocks: deque[Block] = field(default_factory=deque)
 
     def add(self, block: Block) -> None:
-        """Positions as they arrive; a counter that is not finite or was handed out before is not an answer."""
+        """Add received positions; those with a counter that is not finite, or was returned before, are ignored."""
         if len(block) and np.isfinite(block.seq).all() and block.seq[-1] > self._given:
             self._blocks.append(block)
 
     def up_to(self, seq: float) -> Block | None:
-        """Rows not handed out yet with a counter up to ``seq``, or None while the machine has not come so far."""
+        """Rows not returned yet with a counter up to ``seq``; None until the machine has reached it."""
         if not self._blocks or self._blocks[-1].seq[-1] < seq:
             return None
         taken = [_rows(self._blocks[0], slice(0, 0))]

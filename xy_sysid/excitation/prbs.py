@@ -2,7 +2,7 @@
 
 The clock is the slowest rate / whole number at or above 2.5 ``high`` (or the rate itself), which leaves the power at
 ``high`` 2.4 dB down (3.9 dB at a rate of only 2 ``high``); the sequence is the longest of 2^n - 1 chips that fits in
-``period``. The seed chooses where in it the stream starts.
+``period``. The seed selects the start within the sequence.
 
 Source: S. W. Golomb, "Shift Register Sequences", 1967; clock rule: L. Ljung, "System Identification", 2nd ed., section 13.3.
 """

@@ -1,17 +1,17 @@
-"""Does plus voltage mean plus position? A test that gathers evidence from the first motion on, at any voltage.
+"""Does plus voltage mean plus position? A test that collects evidence from the first motion on, at any voltage.
 
 Two models of each axis are fitted to the motion of the last seconds. In both, the displacement of a short interval is
 
-    steady drift + what goes on of the two intervals before + sum of response_i * mean voltage of some intervals before
+    constant drift + a combination of the two displacements before + sum of response_i * mean voltage of some intervals before
 
-and the response to a plus voltage is never negative in one, and never positive in the other. Masses, friction, delays, lags and
-encoders on the load side all answer first in the direction of the voltage. The axis is wired backwards if the negative model is
-better by far more than chance: by EVIDENCE in log likelihood, and with at most half of the residual error, while the positive model
-explains less than half of what is new in the motion.
+and the response to a plus voltage is never negative in one, and never positive in the other. Axes with mass, friction, delay, lag
+or an encoder on the load side all move first in the direction of the voltage. The axis is wired backwards if the negative model is
+better by EVIDENCE in log likelihood, far above chance, and has at most half of the residual power, while the positive model
+explains less than half of the new motion.
 
-The voltage is the excitation alone, without centring: the excitation does not depend on the motion, so no disturbance, falling
-load or vibration of a resting axis can go along with it by itself. Only motion beyond the encoder's noise is judged, and only
-motion that is slow enough for the intervals: at a frequency at which the delay is half a period, plus does move it to minus.
+The voltage is the excitation alone, without centring: it does not depend on the motion, so no disturbance, falling load or
+vibration of a resting axis correlates with it. Only motion above the encoder's noise is judged, and only motion that is slow
+enough for the intervals: at a frequency at which the delay is half a period, plus voltage does move the axis to minus.
 
 Source: generalized likelihood ratio test, S. M. Kay, Fundamentals of Statistical Signal Processing, vol. 2, 1998, chapter 6.
 """
@@ -25,21 +25,21 @@ from xy_sysid.excitation.encoder_noise import BENT, EncoderNoise
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import ExcitationSettings
 
-INTERVAL = 0.01  # s, unless positions come more seldom
-LAGS = ((0, 1), (1, 2), (2, 3), (3, 4), (4, 6), (6, 8), (8, 12), (12, 16))  # first and end of the intervals before, which share one response
+INTERVAL = 0.01  # s, longer if a block is longer
+LAGS = ((0, 1), (1, 2), (2, 3), (3, 4), (4, 6), (6, 8), (8, 12), (12, 16))  # first and end of past intervals that share one response
 PAST = LAGS[-1][1]
-SPANS = (50, 200)  # intervals that are looked at: a sign that turns shows in the short one, a low voltage in the long one
-EVIDENCE = 20.0  # ratio of log likelihoods; right machines of all kinds, sticky, late, soft, loaded, have shown 13 at most
-BETTER = 2.0  # times less residual power than the other, which explains less than this part itself
+SPANS = (50, 200)  # intervals of two tests: the short one shows a changed sign, the long one a low voltage
+EVIDENCE = 20.0  # log likelihood ratio; correctly wired machines with friction, delay, resonances or loads have shown 13 at most
+BETTER = 2.0  # least ratio of residual powers, and of the power to the residual power of the positive model
 NORMAL = 3.0  # mean fourth power of normal numbers of variance 1
-FINEST = 1e-6  # no model of a machine is better than this part of the power
-FAST = 0.25  # greatest part of the new in steps that motion within an interval may have, beyond noise and a straight line
-LEAST = 12  # intervals without which nothing is said
-GAP = 5  # intervals without a position, after which it begins again
+FINEST = 1e-6  # of the power: least residual power of a model
+FAST = 0.25  # of the new part of steps: most motion within an interval, beyond noise and a straight line
+LEAST = 12  # least intervals for a test
+GAP = 5  # intervals without a position, after which the test restarts
 
 
 class SignCheck:
-    """``sent`` and ``saw`` in the order in which they happen; ``saw`` gives the axes that go against their voltage."""
+    """Call ``sent`` and ``saw`` in the order of events; ``saw`` returns the axes that move against their voltage."""
 
     def __init__(self, settings: ExcitationSettings) -> None:
         self._number = len(settings.axes)
@@ -47,19 +47,19 @@ class SignCheck:
         self.forget()
 
     def use(self, settings: ExcitationSettings) -> None:
-        """Take the rate."""
+        """Take the interval from the settings."""
         self._interval = max(round(INTERVAL * settings.rate), settings.step)  # samples
 
     def forget(self) -> None:
-        """Start again, because nothing is known of what happened during a pause."""
+        """Restart after a pause, in which the motion is unknown."""
         none = np.empty((0, self._number))
         self._ends, self._sums = np.empty(0), none  # of the excitation: counter, and V samples until there
-        self._seqs, self._places, self._unsure = np.empty(0), none, none  # of the motion: counter, mean in m, what a step must have in m^2
+        self._seqs, self._places, self._unsure = np.empty(0), none, none  # of the motion: counter, mean in m, least power of a step in m^2
         self._since = np.full(self._number, -np.inf)  # counter since which the voltage is the excitation
         self._looked = -np.inf
 
     def sent(self, seq: float, signal: FloatArray, guarded: FloatArray) -> None:
-        """The excitation, (n, axes) V, whose first sample has this counter; guarded: (axes,) whether a guard has sent something else."""
+        """Store excitation, (n, axes) V; seq: counter of its first sample; guarded: (axes,) whether a guard changed the voltage."""
         before = self._sums[-1] if len(self._sums) else np.zeros(self._number)
         first = int(np.searchsorted(self._ends, seq - (SPANS[-1] + 2 * PAST) * self._interval))
         self._ends = np.concatenate((self._ends[first:], (seq, seq + len(signal))))
@@ -67,7 +67,7 @@ class SignCheck:
         self._since = np.where(guarded, seq + len(signal) + PAST * self._interval, self._since)
 
     def saw(self, seq: FloatArray, values: FloatArray, noise: EncoderNoise) -> list[int]:
-        """Positions, (n, axes) in m, with their counters; noise: what the encoder has shown until here."""
+        """Check positions, (n, axes) in m, with their counters; returns the axes with a wrong sign. noise: of the encoder so far."""
         if self._seqs.size and seq[0] - self._seqs[-1] > GAP * self._interval:
             self.forget()
         first = int(np.searchsorted(self._seqs, seq[-1] - (SPANS[-1] + 3) * self._interval))
@@ -98,7 +98,7 @@ class SignCheck:
 
 
 def _unsure(values: FloatArray, noise: FloatArray) -> FloatArray:
-    """(axes,) m^2 that a step must have to tell something: of the noise, and of the motion of (n, axes) positions about their straight line."""
+    """(axes,) m^2, least power of a step to be judged: from the noise, and from the motion of (n, axes) positions about a straight line."""
     number = len(values)
     unsure = BENT * noise / number
     if number < 3:
@@ -109,7 +109,7 @@ def _unsure(values: FloatArray, noise: FloatArray) -> FloatArray:
 
 
 def _against(steps: FloatArray, responses: FloatArray, unsure: FloatArray, span: int) -> bool:
-    """Whether a negative response explains the newest steps so much better than a positive one.
+    """Whether a negative response explains the newest ``span`` steps better than a positive one by EVIDENCE.
 
     steps: (n,) m; responses: (n, lags) V; unsure: (n,) m^2
     """
@@ -127,7 +127,7 @@ def _against(steps: FloatArray, responses: FloatArray, unsure: FloatArray, span:
     if plus < len(step) / BETTER or plus < BETTER * minus:
         return False
     rest = step - told @ fits[0][0]
-    alike = max(float(rest[1:] @ rest[:-1]) / plus, 0.0)  # slow motion tells less than it has steps
-    jerks = NORMAL * len(step) / float(np.mean(step**4))  # and so does motion of a few jerks
+    alike = max(float(rest[1:] @ rest[:-1]) / plus, 0.0)  # steps of slow motion are correlated
+    jerks = NORMAL * len(step) / float(np.mean(step**4))  # motion of a few jerks has fewer independent steps too
     free = min(jerks, len(step)) * (1 - alike) / (1 + alike) - known.shape[1] - np.count_nonzero(fits[1][0])
     return bool(0.5 * free * np.log(plus / max(minus, FINEST * plus)) > EVIDENCE)

@@ -1,7 +1,7 @@
-"""Stepped sine: one frequency after the other on a log axis, each for whole cycles, without a jump between them.
+"""Stepped sine: one frequency after the other on a logarithmic axis, each for whole cycles, without a jump between them.
 
-A dwell holds as many cycles as fit in ``period``, at least one; the frequency is moved by a fraction of a sample so that
-they end on a sample. Each dwell starts and ends at zero. After the last frequency it starts again.
+A dwell has as many cycles as fit in ``period``, at least one; the frequency is changed slightly so that they end on a sample. Each
+dwell starts and ends at zero. After the last frequency the signal repeats.
 
 Source: R. Pintelon, J. Schoukens, "System Identification: A Frequency Domain Approach", 2nd ed., section 5.3.
 """
@@ -21,7 +21,7 @@ from xy_sysid.settings import AxisExcitation
 
 @dataclass(frozen=True, slots=True)
 class Dwell:
-    """One frequency, Hz, held for so many samples that contain whole cycles, from sample ``start`` of the schedule."""
+    """One frequency, Hz, with its number of cycles and samples, from sample ``start`` of the schedule."""
 
     frequency: float
     cycles: int
@@ -53,5 +53,5 @@ def _repeat(dwells: tuple[Dwell, ...], amplitude: float) -> Iterator[FloatArray]
 
 
 def stepped_sine(settings: AxisExcitation, rate: float) -> Parts:
-    """Sine of the set rms at each frequency of ``schedule``; holds one dwell in memory."""
+    """Sine of the set rms at each frequency of ``schedule``, which may raise BadInput; stores one dwell at a time."""
     return Parts.of(_repeat(schedule(settings, rate), np.sqrt(2) * settings.rms))

@@ -1,36 +1,36 @@
-"""The holders of STOP: each publisher that requested it, until it releases its STOP or an operator overrides it by name."""
+"""The holders of STOP: each publisher that requested it, until it releases its STOP or an operator overrides it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-AGAIN = 30.0  # s in which an operator who was told whom he overrides may confirm it
-KEPT = 100  # publishers without a STOP of which the last message is remembered
+AGAIN = 30.0  # s in which an operator may confirm an override after the answer that names the holders
+KEPT = 100  # most publishers without a STOP whose last message is stored
 
 
 @dataclass(frozen=True, slots=True)
 class _Said:
-    """The last word of a publisher: its number, and whether STOP is on."""
+    """The last message of a publisher: its number, and whether STOP is on."""
 
     number: int
     on: bool
 
 
 class StopLatch:
-    """``heard`` takes what publishers say, ``release`` what an operator wants; STOP is on while anybody holds it."""
+    """``heard`` takes messages of publishers, ``release`` requests of an operator; STOP is on while any publisher holds it."""
 
     def __init__(self) -> None:
         self._said: dict[bytes, _Said] = {}
-        self._named: tuple[float, frozenset[bytes]] = (0.0, frozenset())  # whom the operator was told of, and until when he may confirm
+        self._named: tuple[float, frozenset[bytes]] = (0.0, frozenset())  # s until which the operator may confirm, and the named holders
 
     @property
     def holders(self) -> tuple[bytes, ...]:
-        """Publishers who hold STOP, in the order in which they were first heard."""
+        """Publishers that hold STOP, in the order of their first messages."""
         return tuple(publisher for publisher, said in self._said.items() if said.on)
 
     def heard(self, publisher: bytes, number: int, on: bool) -> None:
-        """A message and its number; one that is older than the last of its publisher came by a second way, and is no news."""
+        """Take a message and its number; one older than the last of its publisher came by the second subscription, and is ignored."""
         before = self._said.get(publisher)
         if before is not None and number < before.number:
             return
@@ -40,9 +40,9 @@ class StopLatch:
             del self._said[one]
 
     def release(self, now: float, name: Callable[[bytes], str]) -> tuple[bool, str]:
-        """What an operator's release does at a time, s: whether STOP is off, and the answer.
+        """Handle an operator's release at a time, s: returns whether STOP is off, and the answer.
 
-        The first call names whom it would override and changes nothing; a second one within AGAIN overrides exactly those.
+        The first call names the holders and changes nothing; a second one within AGAIN overrides them, unless there is a new holder.
         """
         holders = self.holders
         if not holders:

@@ -1,9 +1,9 @@
-"""Swept sine that repeats without a jump: the frequency rises evenly from low to high, and returns smoothly.
+"""Swept sine that repeats without a jump: the frequency rises linearly from low to high, and returns smoothly.
 
-The return takes the last twentieth of the period along a raised cosine, so that the phase and the frequency are continuous;
+The return takes the last twentieth of the period along a raised cosine, so that phase and frequency are continuous;
 high is lowered by less than two lines so that a period holds whole cycles.
 
-Source: linear chirp; the wrap is our own, chosen because a sweep up and down again leaves holes in the line spectrum.
+Source: linear chirp; the return is this project's choice, because a sweep up and down leaves holes in the line spectrum.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.contract import Periodic, below_nyquist, samples
 from xy_sysid.settings import AxisExcitation
 
-RETURN = 0.05  # part of the period in which the frequency goes back to low
+RETURN = 0.05  # part of the period in which the frequency returns to low
 
 
 def sweep(settings: AxisExcitation, rate: float) -> Periodic:

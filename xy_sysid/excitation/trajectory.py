@@ -1,8 +1,8 @@
 """Excitation for a robot that takes only trajectories: a multisine or a sweep that begins and ends at rest, within limits.
 
-A JointTrajectoryController interpolates between points with position, velocity and acceleration by quintic polynomials, so points that carry all
-three are followed without corners. The signal fades in and out by a smooth step whose first two derivatives vanish at both ends, and it is as
-large as the tightest of three limits allows: of position, of speed, of acceleration.
+A JointTrajectoryController interpolates between points with position, velocity and acceleration by quintic polynomials, so the motion is smooth.
+The signal fades in and out by a smooth step whose first two derivatives are 0 at both ends. Its size is the largest within the limits of position,
+speed and acceleration.
 (Swevers, Ganseman, Tükel, De Schutter & Van Brussel, IEEE Trans. Robot. Autom. 13 (1997), 730-740)
 """
 
@@ -15,14 +15,14 @@ import numpy as np
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
-FADE = 0.1  # of the whole time, at either end
-CYCLES = 2.0  # of the lowest frequency that the time holds at least
-POINTS_EACH = 8.0  # points in a period of the highest frequency at least
+FADE = 0.1  # of the duration, at either end
+CYCLES = 2.0  # least cycles of the lowest frequency
+POINTS_EACH = 8.0  # least points in a period of the highest frequency
 
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """Of the motion about the start: position (m or rad), speed and acceleration, all above 0; start: where it begins and ends."""
+    """Limits of the motion about the start: position (m or rad), speed and acceleration, all above 0; start: first and last position."""
 
     position: float
     speed: float
@@ -32,7 +32,7 @@ class MotionLimits:
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """Points of one joint: time (n,) s from 0; position, speed, acceleration (n,); limited_by: the limit that decides its size."""
+    """Points of one joint: time (n,) s from 0; position, speed, acceleration (n,); limited_by: the limit that determines the size."""
 
     time: FloatArray
     position: FloatArray
@@ -51,8 +51,8 @@ def trajectory(
 ) -> Trajectory:
     """The largest motion of a kind within the limits, about their start.
 
-    kind: multisine or sweep; band: Hz; rate: points a second
-    Raises BadInput for a band that the time or the points cannot hold, or limits that are not positive.
+    kind: multisine or sweep; band: (low, high) Hz; seconds: duration; rate: points per second
+    Raises BadInput for a band that does not fit the duration or the rate, or limits that are not positive.
     """
     low, high = band
     if kind not in ("multisine", "sweep"):
@@ -86,7 +86,7 @@ def trajectory(
 
 
 def _multisine(time: FloatArray, band: tuple[float, float], seconds: float, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Every line of the band with the same size in speed, of random phases, and its two derivatives."""
+    """A sum of all lines of the band, of equal amplitude in speed and random phases, and its two derivatives."""
     lines = np.arange(int(np.ceil(band[0] * seconds)), int(band[1] * seconds) + 1) / seconds
     omega = 2.0 * np.pi * lines
     turn = np.exp(1j * (time[:, None] * omega[None, :] + np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, lines.size)))
@@ -95,7 +95,7 @@ def _multisine(time: FloatArray, band: tuple[float, float], seconds: float, seed
 
 
 def _sweep(time: FloatArray, band: tuple[float, float], seconds: float, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A sine whose frequency rises exponentially, with the same size in speed throughout, and its two derivatives."""
+    """A sine whose frequency rises exponentially, of constant amplitude in speed, and its two derivatives."""
     growth = np.log(band[1] / band[0]) / seconds
     omega = 2.0 * np.pi * band[0] * np.exp(growth * time)
     phase = (omega - omega[0]) / growth

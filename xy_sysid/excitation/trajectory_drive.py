@@ -1,7 +1,7 @@
-"""The drive of a robot that takes only trajectories: pieces of one motion, of which each ends at rest.
+"""The drive of a robot that takes only trajectories: pieces of one motion, each of which ends at rest.
 
-The controller is told the next ``horizon`` seconds and how to brake after them, and again before they are over. Whatever happens to this
-computer, the joint comes to rest within its limits. All guards of a position command hold here, too; what they do is brake.
+A message has the next ``horizon`` seconds and the braking after them; the next one follows before they are over. So the joint comes to rest
+within its limits even if this computer fails. All guards of a position command act here too, by braking.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from xy_sysid.excitation.trajectory import MotionLimits, Trajectory, trajectory
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, knobs
 
-PIECES = 5  # messages in a horizon: a few may get lost
-LEAD = 0.02  # s until a message is with the controller, so that it brakes from a place where it has not been yet; its clock may be ahead by less
-BEHIND = 0.1  # s of motion that is over in a message, for a controller whose clock is late by less
+PIECES = 5  # messages in a horizon: some may be lost
+LEAD = 0.02  # s until a message reaches the controller, so that braking begins in its future; its clock may be ahead by less
+BEHIND = 0.1  # s of past motion in a message; the controller's clock may be late by less
 
 
 class TrajectoryDrive(Drive):
-    """As ``Drive``; ``message`` is what the controller has to be told."""
+    """``Drive`` for trajectories; ``message`` returns the points for the controller."""
 
     def __init__(self, settings: ExcitationSettings, seq: int = 0, watched: bool = True, starts: Starts | None = None) -> None:
-        """See ``Drive``. Raises BadInput for a motion that its limits do not allow."""
+        """As ``Drive``. Raises BadInput for a motion that exceeds its limits."""
         super().__init__(settings, seq, watched, starts)
         self._motions = [_motion(name, axis, settings) for name, axis in settings.axes.items()]
         self._plan: MotionPlan | None = None
         self._first = 0  # counter at the start of the plan
         self._told: int | None = None  # sample of the plan at the last message
-        self._until = 0  # sample from which on the controller brakes, as it was told last
-        self._last_word = False  # the controller was told to brake
+        self._until = 0  # sample at which the controller brakes by the last message
+        self._last_word = False  # the last message brakes
 
     def see(self, block: Block, overdue: int = 0) -> bool:
-        """See ``Drive``; where the joint stands first is where the motion begins and comes back to."""
+        """As ``Drive``; the motion begins at the first position of the joint, and returns to it."""
         usable = super().see(block, overdue)
         if usable and self._plan is None and self._start is not None and self.state == "active":
             axes = list(self.settings.axes.values())
@@ -73,14 +73,14 @@ class TrajectoryDrive(Drive):
         )
 
     def stop(self, reason: str, seconds: float) -> None:
-        """Brake as fast as the limits of acceleration allow, whatever the seconds are."""
+        """Brake at the limits of acceleration; ``seconds`` is not used for the motion."""
         was_active = self.state == "active"
         super().stop(reason, seconds)
         if was_active and self._plan is not None:
             self._plan.brake(self._sample + self._lead)
 
     def change(self, settings: ExcitationSettings) -> None:
-        """See ``Drive``; the motion itself does not change while active."""
+        """As ``Drive``; settings of the motion cannot change while active."""
         before = {item.name: item.value for item in knobs(self.settings)}
         for item in knobs(settings):
             if self.state in ("active", "stopping") and item.name not in LIVE and before.get(item.name) != item.value:
@@ -90,7 +90,7 @@ class TrajectoryDrive(Drive):
         super().change(settings)
 
     def catch_up(self, missed: int) -> Block:
-        """See ``Drive``; the controller went on meanwhile, up to the end of what it was told."""
+        """As ``Drive``; the controller continued meanwhile, up to the end of the last message."""
         if self._told is not None and self.state == "active" and self._sample + missed > self._until:
             assert self._plan is not None
             self._plan.brake(self._until)
@@ -102,18 +102,18 @@ class TrajectoryDrive(Drive):
 
     @property
     def safe(self) -> FloatArray:
-        """See ``Drive``; where the motion comes to rest once it brakes."""
+        """As ``Drive``; once the motion brakes, its final position."""
         place = self._plan.place if self._plan is not None else None
         return super().safe if place is None else place
 
     @property
     def stopping_time(self) -> float:
-        """See ``Drive``."""
+        """Remaining time until rest, s; 0 while the motion does not brake."""
         rests = self._plan.rests if self._plan is not None else None
         return 0.0 if rests is None else max(rests - self._sample, 0) / self.settings.rate
 
     def message(self) -> MotionPoints | None:
-        """What the controller has to be told now, if anything; samples count from ``stamp_from``."""
+        """The points for the controller, if a message is due; samples count from ``stamp_from``."""
         if self._plan is None or self.state not in ("active", "stopping", "stopped"):
             return None
         rate, now, brakes = self.settings.rate, self._sample, self._plan.rests is not None
@@ -122,7 +122,7 @@ class TrajectoryDrive(Drive):
             return None
         self._last_word = brakes
         if brakes and self.stopping_time == 0.0:
-            return None  # it rests already
+            return None  # it is at rest already
         self._told, self._until = now, now + round(self.settings.horizon * rate)
         return self._plan.ahead(now - math.ceil(BEHIND * rate), self._until)
 
@@ -133,7 +133,7 @@ class TrajectoryDrive(Drive):
 
     @property
     def strayed(self) -> FloatArray | None:
-        """(axes,) where the joints were measured, if that is further from where the motion ended than the brake zone; otherwise None."""
+        """(axes,) measured position, if it differs from the final position of the motion by more than the brake zone; otherwise None."""
         place = self._plan.place if self._plan is not None else None
         if place is None or self.state != "stopped" or self._travel.seen is None:
             return None
@@ -160,18 +160,18 @@ class TrajectoryDrive(Drive):
         return math.ceil(LEAD * self.settings.rate)
 
     def _reference(self, n: int) -> FloatArray:
-        """(n, axes) of the plan."""
+        """(n, axes) positions of the plan."""
         self._begun += n
         return np.tile(self.safe, (n, 1)) if self._plan is None else self._plan.at(self._sample, n).position
 
 
 def drive_of(settings: ExcitationSettings, seq: int = 0, starts: Starts | None = None) -> Drive:
-    """The drive that these settings ask for; raises BadInput as it does."""
+    """The drive for these settings; raises BadInput if a signal does not fit the rate or the limits."""
     return (TrajectoryDrive if settings.command == "joint_trajectory" else Drive)(settings, seq, starts=starts)
 
 
 def _motion(name: str, axis: AxisExcitation, settings: ExcitationSettings) -> Trajectory | None:
-    """One period about 0, of the rms that is asked for or the largest within the limits; None for an axis that stays."""
+    """One period about 0, with the set rms or the largest within the limits; None for an axis at rest. Raises BadInput for too large an rms."""
     if axis.kind == "off":
         return None
     room = axis.limit - 0.5 * axis.max_speed / settings.rate  # braking takes up to a sample longer than the limits allow

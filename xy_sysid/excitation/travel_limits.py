@@ -1,16 +1,16 @@
 """Soft travel limits: fade outward voltage in a zone before each end, down to an inward push at the end.
 
-The push has at most the magnitude of the voltage that is asked for, unless the axis moves outward by more than the noise of its
-encoder explains. So no guard ever moves an axis that rests.
+The push has at most the magnitude of the requested voltage, unless the axis moves outward by more than the noise of its encoder
+explains. So no guard ever moves an axis at rest.
 
-Positions are old when they arrive and a block lasts, so the guard looks at where the axis will be when it answers: the last
-place plus the time since then (and REACTION) times an outward speed. That speed is the greatest of those seen during the
-last such time, and of what the voltages under way and asked for mean for this axis, by the ratio of speed to voltage that
-it has shown so far (up to what any motion can have). Speed is motion beyond the noise. A fast axis, loud voltage or an old
-position therefore brake earlier instead of later.
+Positions are old when they arrive, and a block has a duration, so the guard predicts the position at which the axis will respond:
+the last position plus the time since then (and the reaction time) times an outward speed. That speed is the largest of the recent
+speeds and of the speeds expected from the sent and requested voltages, by the ratio of speed to voltage of this axis so far (within
+the fastest possible motion). Speed is motion above the noise. So with a fast axis, a high voltage or an old position the guard
+brakes earlier.
 
-Proven on 0.097 m/s/V, 246 rad/s, 1.3 ms delay with up to 10 V and 40 ms old positions. The zone must be longer than the way
-in which the axis stops by itself at 0 V.
+Tested on 0.097 m/s/V, 246 rad/s, 1.3 ms delay with up to 10 V and 40 ms old positions. The zone must be longer than the distance in
+which the axis stops by itself at 0 V.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from xy_sysid.excitation.motion_check import FASTEST, gains, reaction
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import ExcitationSettings
 
-FURTHEST = 0.1  # s, nothing is extrapolated further ahead than this
+FURTHEST = 0.1  # s, longest extrapolation
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class _Sent:
-    """A block of voltage on its way: its first and last counter, (axes,) mean in V."""
+    """A sent block of voltage: its first and last counter, (axes,) mean in V."""
 
     first: float
     last: float
@@ -46,7 +46,7 @@ class _Sent:
 
 
 class TravelGuard:
-    """The limits of all axes, and what is known of how they move."""
+    """The limits of all axes, and their recent motion and voltage."""
 
     def __init__(self, settings: ExcitationSettings) -> None:
         self.use(settings)
@@ -67,9 +67,9 @@ class TravelGuard:
         self._fastest = FASTEST * gains(settings)
 
     def saw(self, seen: Seen, still: FloatArray) -> None:
-        """Take note of where the axes are; still: (axes,) m that need no motion."""
+        """Store a position; still: (axes,) m, largest change without motion."""
         self._still = still
-        if self._speeds and self._speeds[-1].seq > seen.seq:  # the machine counts from the start again
+        if self._speeds and self._speeds[-1].seq > seen.seq:  # the machine's counter has restarted
             self._speeds.clear()
         self.seen = seen
         self._speeds.append(seen)
@@ -81,16 +81,16 @@ class TravelGuard:
             self._voltage_power += mean**2
 
     def sent(self, seq: float, values: FloatArray) -> None:
-        """Take note of a block of voltage, (n, axes), whose first sample has this counter."""
+        """Store voltage, (n, axes); seq is the counter of its first sample."""
         self._sent.append(_Sent(seq, seq + len(values) - 1, values.mean(axis=0)))
         while len(self._sent) > 1 and self._sent[-1].last - self._sent[0].first > 2 * FURTHEST * self.rate:
             self._sent.popleft()
 
     def within(self, driven: FloatArray, seq: float) -> FloatArray:
-        """The voltage wanted, (n, axes) from counter ``seq`` on, faded where the axes come near an end.
+        """The requested voltage, (n, axes) from counter ``seq`` on, faded near the ends of travel.
 
-        Never outward for an axis that was last seen at or beyond a limit. Where the forecasts reach both ends, the one that the axis
-        is nearer to has its way.
+        It is never outward for an axis whose last position is at or beyond a limit. If the prediction reaches both ends, the nearer end
+        has priority.
         """
         if self.seen is None:
             return driven

@@ -14,7 +14,7 @@ from xy_sysid.experiment_design.of_run import NextExperiment
 
 
 def as_trajectory(found: NextExperiment, model: AxisModel, rate: float) -> Trajectory:
-    """Points of the motion that the fitted model makes in an experiment.
+    """The predicted motion of the fitted model in an experiment, as points of a trajectory.
 
     rate: points per second; frequencies above an eighth of it are removed, because a controller cannot follow them between points
     Raises BadInput if there is no experiment, for a rate above the recording's, and for a motion that would exceed a limit of the machine.

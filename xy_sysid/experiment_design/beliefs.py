@@ -31,7 +31,7 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True)
 class Belief:
-    """effects: their names; model: the most likely; draws: models that the data allow, the first is ``model``
+    """effects: names; model: the most likely one; draws: models that the data allow, ``model`` first
     scale: coordinates of each parameter; precision: (k, k) in these coordinates; free: parameters of the effects
     force, motion: power of the unmodelled force, V^2, and of the unmodelled motion, m^2/s^2
     """
@@ -63,7 +63,7 @@ class Evidence:
     """How well models explain the present data: in nats over every window, fitted or held out."""
 
     def __init__(self, data: AxisData, travel: tuple[float, float] | None = None) -> None:
-        """travel: of the machine, m; None: the range of the data."""
+        """travel: (low, high) of the machine, m; None: the range of the data."""
         self.travel = travel
         self.machine = data.similar if travel is None else replace(data.similar, length=0.5 * (travel[1] - travel[0]) / REACH)
         self.data, self.windows = data, Windows(data.layout, np.sort(np.concatenate((data.fitted.begins, data.held_out.begins))))
@@ -86,7 +86,7 @@ class Evidence:
         return np.asarray(self.measured - self.windows.spectrum(task.at(MEDIUM)(task.row)))
 
     def nats(self, model: AxisModel, error: NDArray[np.complex128] | None = None) -> float:
-        """Nats above an error that equals the noise floor; infinite for a model that diverges."""
+        """Nats in excess of an error that equals the noise floor; infinite for a model that diverges."""
         error = self.error(model) if error is None else error
         power = self.data.layout.power(error)
         if not np.all(np.isfinite(power)):
@@ -128,7 +128,7 @@ def usual_precision(evidence: Evidence, model: AxisModel, scale: Scale) -> Float
 
 
 def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -> Belief:
-    """The belief from a fit: draws around it, as wide as the data allow."""
+    """The belief from a fit, with draws around it that the data allow."""
     model = _valid(evidence, replace(found.model, per_recording=()))
     scale = _scale(evidence.data, model)
     slopes, _ = evidence.whitened(model, scale)
@@ -147,9 +147,9 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
 
 
 def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
-    """Add an effect that is not visible in the data to a model that explains them, with the usual sizes that the data allow.
+    """The belief in a model that explains the data and an effect that the data do not show, with usual sizes that the data allow.
 
-    A relative in the model is replaced, and parameters of the same name keep their values. None if the data allow no such size.
+    The new effect replaces one of its family, and parameters of the same name keep their values. None if the data allow no such size.
     best: nats of the model that explains the data best; draws: number of draws, and their seed
     """
     count, seed = draws
@@ -224,7 +224,7 @@ def _settled(evidence: Evidence, model: AxisModel, fixed: set[str]) -> AxisModel
         slopes, error = evidence.whitened(model, scale)
         if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(error))):
             break
-        inner = scale.inner(model.row)  # directions that the data do not determine take the smallest step
+        inner = scale.inner(model.row)  # directions that the data do not determine stay unchanged
         inner[free] -= np.clip(np.linalg.lstsq(slopes[free].T, error, rcond=LEAST_SEEN)[0], -0.5, 0.5)
         moved = with_row(model, scale.outer(inner))
         then = evidence.nats(moved)
@@ -241,7 +241,7 @@ def _scale(data: AxisData, model: AxisModel) -> Scale:
 
 
 def _root(precision: FloatArray) -> FloatArray:
-    """(k, k) whose product with standard normal numbers has this precision."""
+    """(k, k) matrix whose product with standard normal numbers has this precision."""
     unit = np.sqrt(np.diag(precision))
     values, vectors = np.linalg.eigh(precision / np.outer(unit, unit))
     return np.asarray(vectors / np.sqrt(np.maximum(values, 1e-12)) / unit[:, None])

@@ -27,8 +27,8 @@ from xy_sysid.hypotheses.criteria import DOUBTFUL
 class Judged:
     """An experiment with its evaluation.
 
-    seconds: of steady motion after which the sets are distinguished with 95 %, infinite if ``most`` do not suffice; probability: of this
-    at the end; each: powers of each draw; broken: name of a limit that it would exceed, with margin, or empty; shortest: its least duration, s
+    seconds: of steady motion after which the sets are distinguished with 95 %, infinite if the limit of duration does not suffice; probability: of
+    this at the end; each: powers of each draw; broken: name of a limit that it would exceed, with margin, or empty; shortest: least duration, s
     """
 
     experiment: Experiment
@@ -40,7 +40,7 @@ class Judged:
 
     @property
     def order(self) -> tuple[float, float, float]:
-        """Sort key, smaller is better; if no experiment decides, the evidence per second counts."""
+        """Sort key, smaller is better: duration if it decides, else probability; then evidence per second."""
         rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
         if math.isfinite(self.seconds):
             return max(self.seconds + self.experiment.ramp, self.shortest), 0.0, -rate
@@ -55,7 +55,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Design:
-    """beliefs: the sets to distinguish; best: the experiment that does it in the shortest time; tried: all evaluated ones; rate: Hz."""
+    """beliefs: of the sets to distinguish; best: the experiment that does so in the shortest time; tried: all evaluated ones; rate: Hz."""
 
     beliefs: tuple[Belief, ...]
     limits: MachineLimits

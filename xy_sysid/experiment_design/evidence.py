@@ -42,7 +42,7 @@ class Power:
 def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> list[Power]:
     """Powers for one draw of a set: for the first set against every other one, for another set against the first.
 
-    A rival that contains the set as a special case is left out: it explains everything that the set does. It is judged as the true set.
+    A rival that contains the set as a special case is left out, because it explains everything that the set explains.
     """
     own, library = beliefs[truth], model.library
     found = []

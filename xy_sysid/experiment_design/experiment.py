@@ -21,7 +21,7 @@ BANDED = ("noise", "multisine", "multisine_odd", "multisine_detect", "sweep", "s
 
 @lru_cache(maxsize=KEPT)
 def unit_signal(told: AxisExcitation, sampling_rate: float, n: int) -> FloatArray:
-    """(n,) signal of rms 1, read-only: many experiments differ only in their amplitude, and each is simulated with many models."""
+    """(n,) signal of rms 1, read-only and cached: many experiments differ only in amplitude, and each is simulated with many models."""
     made = signal(told, sampling_rate).next(n)
     made.setflags(write=False)
     return made

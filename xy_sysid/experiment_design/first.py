@@ -3,7 +3,7 @@
 The axis is assumed to cross its travel at full voltage in 0.3 to 10 s, with any pole, delay and dry friction that
 machines have, and with a load that is smaller than its friction: the axis rests at 0 V, which the first run (``xy-sysid run --first``) checks.
 
-The experiment keeps within the limits for every draw of these, and gives the most information on gain, delay and pole on average.
+The experiment stays within the limits for every drawn axis, and gives the most information on gain, delay and pole on average.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ FRICTION = (0.01, 0.2)  # of the full voltage
 COUNTS = 1e5  # encoder counts within the travel, at least
 WIDTH = 0.05  # wanted half width of the 95 % interval of gain and pole
 DRAWS = 8
-SHORTEST = 30.0  # s: a diagnosis needs held-out windows, whatever gain and pole need
+SHORTEST = 30.0  # s, least duration: a diagnosis needs held-out windows
 
 
 def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, seed: int = 1) -> NextExperiment:

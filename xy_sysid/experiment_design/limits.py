@@ -28,9 +28,9 @@ class MachineLimits:
     voltage: V, of each sample; rms: V, that the drive can give continuously (its current); speed: m/s; acceleration: m/s^2
     travel: (low, high) m; start: m, position at the start of an experiment; with recordings, the end of the last one
     margin: fraction of speed, acceleration and travel that is kept free; seconds: maximum s of one experiment
-    centring: V/m, largest pull of the excitation to the start; above it the axis would oscillate
+    centring: V/m, largest centring gain of the excitation; above it the axis would oscillate
     ramp: s, fade-in of the excitation; brake: m, brake zone before each end of the travel, which no experiment enters
-    units: of the axis, for messages; V and m above stand for them
+    units: of the axis; in other units, read V and m above as these
     """
 
     voltage: float
@@ -80,7 +80,7 @@ class MachineLimits:
         return min(map(self._free, (self.start - self.travel[0], self.travel[1] - self.start)))
 
     def _free(self, way: float) -> float:
-        """m of the distance to an end that a motion may use: up to the margin, outside the brake zone."""
+        """Part of the distance to an end, m, that a motion may use: up to the margin, outside the brake zone."""
         return min((1.0 - self.margin) * way, way - self.brake)
 
     def needed(self, low: float, high: float) -> tuple[float, float]:

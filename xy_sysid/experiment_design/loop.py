@@ -28,7 +28,7 @@ CarryOut = Callable[[Experiment], Signals | None]  # runs an experiment; None if
 
 @dataclass(frozen=True)
 class NextChoice:
-    """experiment: the next one, None if none helps; found: the design that it comes from, if any."""
+    """experiment: the next one, None if none helps; found: its design, if any."""
 
     experiment: Experiment | None
     found: Design | None = None
@@ -67,7 +67,7 @@ class Decision:
         return self.standing.names[self.standing.chosen]
 
     def over(self) -> Ending | None:
-        """Why no experiment follows, independent of the budget."""
+        """Why no experiment follows, independent of the budget; None if one follows."""
         if len(self.left) == 1:
             return "settled"
         if self.then is not None:
@@ -92,7 +92,7 @@ class Settled:
 
 @dataclass(frozen=True)
 class Question:
-    """sets: of effects to distinguish; sampling_rate: Hz; recordings: voltage and position of the existing ones."""
+    """sampling_rate: Hz; recordings: the existing ones; sets: of effects to distinguish; tolerance: part of the motion that models may miss."""
 
     sampling_rate: float
     recordings: Sequence[Signals]
@@ -121,7 +121,7 @@ def decide(
 
 
 def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Budget | None = None, choose: Choose = best_design) -> Settled:
-    """Repeat until one set remains, no experiment helps, or the budget is used up."""
+    """Decide and run experiments until one set remains, no experiment helps, or the budget is used up."""
     budget = budget or Budget()
     recordings: list[Signals] = []
     steps: list[Decision] = []
@@ -154,6 +154,6 @@ def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> E
         if made is None or not made.broken(longer):
             return longer
     unsure = last.choice is not None and last.choice.found is not None and not last.choice.found.possible
-    if unsure and experiments + 1 < budget.experiments:  # it gives information for a better experiment, which needs time too
+    if unsure and experiments + 1 < budget.experiments:  # it prepares a better experiment, which needs time too
         room = max(0.5 * room, MINIMUM)
     return last.then.lasting(min(last.then.seconds, room))

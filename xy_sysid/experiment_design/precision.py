@@ -43,7 +43,7 @@ class Information:
 
 
 def information(belief: Belief, model: AxisModel, item: Recorded) -> Information:
-    """The information of a recording that a model would make."""
+    """The information of a simulated recording of a model."""
     least = expected_error(item, belief)
     layout = item.windows.layout
     weight = ((item.objective.lines > 0.0) / np.sqrt(least))[layout.band]
@@ -56,7 +56,7 @@ def information(belief: Belief, model: AxisModel, item: Recorded) -> Information
 
 @dataclass(frozen=True)
 class Sharpest:
-    """experiment: the best; None if none is needed, or none is within the limits; width: expected half width of the 95 % interval (``Precision``)
+    """experiment: the best; None if none is needed or none is within the limits; width: expected half width of the 95 % interval (``Precision``)
     possible: True if that reaches the wanted width; before: half width from the present data
     """
 

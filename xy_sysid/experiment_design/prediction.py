@@ -23,9 +23,9 @@ from xy_sysid.samples.block import FloatArray
 class Setting:
     """The measurement of an experiment: windows, noise floor and response.
 
-    layout: windows and bands; encoder: m; epsilon: fraction of the motion to which laws are trusted; recorded: s of each present recording
+    layout: windows and bands; encoder: noise, m; epsilon: accuracy of laws, fraction of the motion; recorded: s of each present recording
     response: (bands,) |G|^2 of the machine to a force, as recorded (``greybox.floor``); None before any recording
-    ramp: s in which an experiment fades in
+    ramp: s, fade-in of an experiment
     """
 
     layout: Bands
@@ -55,7 +55,7 @@ class Setting:
     def shortest(self) -> float:
         """Least duration of an experiment, s, with held-out windows when it is compared together with the present recordings.
 
-        The windows grow with the data (``greybox.axis_data``), so the time is found in steps.
+        The windows grow with the data (``greybox.axis_data``), so the duration is searched in steps.
         """
         rate, seconds = self.layout.sampling_rate, BLOCK
         while True:
@@ -70,8 +70,8 @@ class Setting:
 class Recorded:
     """A recording without noise.
 
-    windows: of the steady part; seconds: of it; velocity: (windows, lines) spectrum; objective: scores an error of it
-    trusted: fraction of the motion to which laws are trusted; moves: True if the motion exceeds the encoder's noise
+    windows: of the steady part; seconds: of this part; velocity: (windows, lines) spectrum; objective: scores errors of the velocity
+    trusted: accuracy of laws, fraction of the motion; moves: True if the motion exceeds the encoder's noise
     """
 
     motion: Motion
@@ -84,13 +84,13 @@ class Recorded:
 
 
 def recorded(setting: Setting, experiment: Experiment, model: AxisModel, start: float, seconds: float | None = None) -> Recorded:
-    """The recording of an experiment of some seconds if a model were true."""
+    """The recording of an experiment of ``seconds`` (``looked`` by default) if a model is true; start: m."""
     rate = setting.layout.sampling_rate
     return seen(setting, move(model, rate, experiment.drive(rate, setting.looked if seconds is None else seconds, start), COARSE))
 
 
 def seen(setting: Setting, motion: Motion) -> Recorded:
-    """A motion as an objective uses it, from the end of the fade-in on."""
+    """The recording of a motion, from the end of the fade-in on."""
     rate, length = motion.sampling_rate, setting.layout.length
     velocity = np.diff(motion.position) * rate
     first = min(round(setting.ramp * rate), max(velocity.size - length, 0))

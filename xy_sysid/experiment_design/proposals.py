@@ -1,6 +1,6 @@
 """The experiments that are compared: a grid over kind, band, amplitude, period, position and path, and neighbours of the best.
 
-A place is approached and held by the excitation's pull: with an offset it pulls to another place than the start. A slow sine about it is a path.
+The centring of the excitation holds the axis at its start, or with an offset at another position. With a slow sine the axis follows a path.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from xy_sysid.settings import AxisExcitation
 
 PART = {"noise": 1.0 / CREST, "sweep": 0.7, "step": FULL}  # largest rms (height of a step) over the limit of the voltage
 HALVES = tuple(0.5**k for k in range(QUIETER))  # parts of the largest amplitude
-FINER = tuple(2.0 ** (-0.5 * k) for k in range(2 * QUIETER + 1))  # of a slow sine, which goes as far as its amplitude says
+FINER = tuple(2.0 ** (-0.5 * k) for k in range(2 * QUIETER + 1))  # the same for a slow sine, whose amplitude sets the stroke
 NEAR = {
     "rms": (0.7, 1.4),
     "slow": (0.7, 1.4),
@@ -29,7 +29,7 @@ NEAR = {
 
 
 def proposals(limits: MachineLimits, sampling_rate: float, seed: int = 1) -> list[Experiment]:
-    """Experiments from loud to quiet; those that would break a limit are among them."""
+    """All experiments to compare, including those that would exceed a limit."""
     return [_experiment(limits, sampling_rate, {"seed": seed, **told}) for told in _grid(limits, sampling_rate)]
 
 
@@ -65,7 +65,7 @@ def _grid(limits: MachineLimits, sampling_rate: float) -> Iterator[dict[str, Any
 
 
 def _held(limits: MachineLimits, top: float) -> Iterator[dict[str, Any]]:
-    """Away from the start, or along a path, both held by the pull."""
+    """Experiments away from the start, or along a path, both held by the centring."""
     pulls = [min(part * FULL * limits.voltage / limits.room, limits.centring) for part in HALVES[:2]]
     for side, pull, quiet in product((-PLACES, PLACES), pulls, HALVES[1::2]):
         yield {
@@ -81,7 +81,7 @@ def _held(limits: MachineLimits, top: float) -> Iterator[dict[str, Any]]:
 
 
 def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any]) -> Experiment:
-    """With the limits of the axis, and numbers that its settings allow."""
+    """An experiment within the limits of the axis, with numbers that its settings allow."""
     told = {**told, "limit": limits.voltage, "travel_min": limits.travel[0], "travel_max": limits.travel[1]}
     told["brake"] = min(AxisExcitation.model_fields["brake"].default, 0.2 * (limits.travel[1] - limits.travel[0]))
     told["centring"] = min(max(told.get("centring", 0.0), _centring(limits)), limits.centring, 1e4)
@@ -94,7 +94,7 @@ def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any
 
 
 def _within(name: str, value: Any) -> Any:
-    """A setting's value, moved into what it may be."""
+    """A setting's value, clipped to its allowed range."""
     for bound in AxisExcitation.model_fields[name].metadata if isinstance(value, float) else ():
         value = max(value, getattr(bound, "ge", value))
         value = min(value, getattr(bound, "le", value))
@@ -102,5 +102,5 @@ def _within(name: str, value: Any) -> Any:
 
 
 def _centring(limits: MachineLimits) -> float:
-    """V/m: a fiftieth of the voltage at the nearer end; enough against drift, too little to matter else."""
+    """V/m: a fiftieth of the voltage at the nearer end, enough against drift, too little to affect the result."""
     return min(0.02 * limits.voltage / limits.room, limits.centring, 1e4)

@@ -1,4 +1,4 @@
-"""The sets of effects that the present data do not rule out: the named one, those that predict as well, and effects too small to be seen."""
+"""The sets of effects that the present data do not rule out: the named one, those that predict as well, and effects too small to be visible."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from xy_sysid.hypotheses.moves import is_twice
 class Standing:
     """Sets of effects on the same data.
 
-    names: of each; fits: of each, on all data; chosen: the one whose score is best, parameters at their price
-    doubt: probability that one of the others predicts better, at most a half
+    names, fits: of each, on all data; chosen: index of the best score, with a penalty for each parameter
+    doubt: probability that another set predicts better, at most a half
     """
 
     names: tuple[tuple[str, ...], ...]
@@ -39,7 +39,7 @@ class Standing:
 
 
 def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], known: Sequence[AxisModel | None] = ()) -> Standing:
-    """Fit some sets and compare them on the held-out windows; known: a model of each that was fitted to other data."""
+    """Fit some sets and compare them on the held-out windows; known: a model of each set from other data, as a start. Raises as ``check``."""
     check(library, sets)
     names = tuple(tuple(each) for each in sets)
     before = tuple(known) or (None,) * len(names)
@@ -54,8 +54,8 @@ def standing(data: AxisData, library: Library, sets: Sequence[Sequence[str]], kn
 
 
 def check(library: Library, sets: Iterable[Sequence[str]]) -> None:
-    """Raises BadInput for an effect that is unknown, in every model already, that no free simulation predicts, or whose law is in the set twice,
-    and for a set that is there twice."""
+    """Raises BadInput for an effect that is unknown, part of every model, or not predicted by free simulation, for a law twice in a set,
+    and for a set given twice."""
     sets = [tuple(each) for each in sets]
     for name in (name for each in sets for name in each):
         if not library[name].simulable or library[name].category == "base":
@@ -83,9 +83,9 @@ def _of_one_law(library: Library, names: Sequence[tuple[str, ...]], fits: Sequen
 
 
 def gained(data: AxisData, one: GreyboxFit, other: GreyboxFit) -> Gain:
-    """``gain`` over the windows of several recordings: what differs from one recording to the next is no error of either.
+    """``gain`` over the windows of several recordings; its error does not include the difference between recordings.
 
-    A stratified sample (Cochran, Sampling techniques, 1977, ch. 5): each recording has its own mean. One window alone differs from 0.
+    A stratified sample (Cochran, Sampling techniques, 1977, ch. 5): each recording has its own mean, and 0 if it has only one window.
     """
     found = gain(one, other)
     if len(data.steps) < 2 or not math.isfinite(found.nats):
@@ -99,9 +99,9 @@ def gained(data: AxisData, one: GreyboxFit, other: GreyboxFit) -> Gain:
 
 
 def _from_the_best(data: AxisData, names: Sequence[str], found: GreyboxFit, best: GreyboxFit) -> GreyboxFit:
-    """A fit that starts from what the best one knows, if that is better: an effect takes over what another calls by the same name (a period).
+    """The fit, or a better one that starts from the best fit: the new effect takes over parameters of the same name (a period) from a replaced one.
 
-    A wave whose period a fit has not found would be ruled out for no reason.
+    Otherwise a wave might be ruled out only because its fit did not find the period.
     """
     there = dict(best.model.effects)
     new, gone = [name for name in names if name not in there], [name for name in there if name not in names]
@@ -132,7 +132,7 @@ def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisM
 def beliefs_of(
     data: AxisData, library: Library, found: Standing, travel: tuple[float, float] | None = None, draws: int = DRAWS, seed: int = 0
 ) -> list[Belief]:
-    """What each set says of the motion within a travel, m; that which was chosen first, and sets that the data rule out left out."""
+    """The beliefs in the sets that the data do not rule out, the chosen set first; travel: (low, high), m, within which laws must be valid."""
     evidence = Evidence(data, travel)
     order = sorted(range(len(found.names)), key=lambda k: k != found.chosen)
     best = found.fits[found.chosen]
@@ -147,13 +147,13 @@ def beliefs_of(
 def _belief(
     evidence: Evidence, library: Library, names: tuple[str, ...], fits: tuple[GreyboxFit, GreyboxFit], draws: int, seed: int
 ) -> Belief | None:
-    """fits: of this set, and of the chosen one."""
+    """The belief in a set, None if the data rule it out; fits: of this set, and of the chosen one."""
     own, best = fits
     if own is best:
         return believed(evidence, own, draws, seed)
     rest = frozenset(name for name, _ in best.model.effects)
     new = [name for name in names if name not in rest]
-    holds = contains(library, frozenset(names), rest)  # then it cannot do worse, and a fit that does has not found what there is
+    holds = contains(library, frozenset(names), rest)  # then a worse fit is only not the optimum
     better = gained(evidence.data, best, own)
     if len(new) == 1 and holds and not gained(evidence.data, own, best).is_sure:
         model, least = best.model, evidence.nats(best.model)
@@ -168,7 +168,7 @@ def _belief(
 
 
 def _is_gone(data: AxisData, found: GreyboxFit, name: str) -> bool:
-    """The fit made an effect so small that the model is as good as without it."""
+    """Whether the fit made an effect so small that the model is as good as without it."""
     effect = found.model.library[name]
     pairs = zip(effect.on(data.similar), dict(found.model.effects)[name], strict=True)
     return any(item.positive and (k == 0 or "V" in item.unit) and value < LEAST_START * abs(item.typical) for k, (item, value) in enumerate(pairs))
@@ -179,10 +179,10 @@ def _gives_way(library: Library, name: str, other: str) -> bool:
 
 
 def possible(data: AxisData, library: Library, found: Answer, most: int = 4) -> list[tuple[str, ...]]:
-    """The set that was named, then those that may be true instead: rivals that predict nearly as well, and look-alikes.
+    """The named set, then those that may be true instead: rivals that predict nearly as well, and look-alikes.
 
-    Where nothing was named: the simplest laws that may hide in the noise. Effects stand in the order of the named set.
-    Raises BadInput where an effect was named for which no experiment can be designed.
+    If nothing was named: the simplest laws that may hide in the noise. At most 1 + ``most`` sets.
+    Raises BadInput if free simulation cannot predict a named effect.
     """
     named = found.best
     for name in named:
@@ -203,7 +203,7 @@ def possible(data: AxisData, library: Library, found: Answer, most: int = 4) -> 
 
 
 def look_alikes(library: Library, name: str) -> list[str]:
-    """Effects that one can be taken for, as either of the two says, and its relatives."""
+    """Effects that list this one as a look-alike or are listed by it, and the others of its family."""
     effect = library[name]
     others = [other for other in library.acting if other.name != name]
     return [

@@ -25,9 +25,9 @@ from xy_sysid.samples.recording import Run
 
 @dataclass(frozen=True)
 class WalkPlan:
-    """axis: its name; limits: what experiments may ask of it; budget: of the whole walk
-    sets: of effects that are to be distinguished; empty: those that the diagnosis leaves possible
-    tolerance: part of the motion that a model may leave
+    """axis: its name; limits: of the axis; budget: of the whole walk
+    sets: of effects to distinguish; empty: those that the diagnosis leaves possible
+    tolerance: part of the motion that a model may miss
     """
 
     axis: str
@@ -43,7 +43,7 @@ class WalkStep:
     """The state after some recordings, and the next step.
 
     diagnosis: of all recordings, in a sentence; decision: which sets are left; following: the next experiment, None at the end; ending: why
-    answer: the same experiment with what it needs; experiments, seconds: of motion, that were spent
+    answer: the same experiment with its requirements; experiments, seconds: used so far, s of motion
     """
 
     diagnosis: str
@@ -100,7 +100,7 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
 
 
 def steps(plan: WalkPlan, recordings: Sequence[Run]) -> Iterator[WalkStep]:
-    """Every step of a walk that has these recordings, the first one first. It ends with them, or where nothing follows."""
+    """The steps of a walk with these recordings, in order; it ends with the last recording, or with a step after which nothing follows."""
     before: WalkStep | None = None
     for count in range(1, len(recordings) + 1):
         before = step(plan, recordings[:count], before)

@@ -6,11 +6,11 @@ plan, prediction, leakage:    the expected spectra of a model
 lls, iwls, nlls, ml, nllsfdi: estimators: one per file, all with the signature of ``identify``
 identify:                     the default estimator
 covariance, intervals:        uncertainty of a fit
-finish, result:               content of a fit
+finish, result:               the result of a fit
 modes:                        poles only, a faster path
 model_orders, choose_orders:  which orders the data support, and the default orders of a fit
 verdicts:                     checks of a fit
-check_on_data:                a given model against other data
+check_on_data:                a given model compared with other data
 of_recording:                 from a full recording to responses, axis by axis
 of_run:                       the same for one run, one call per step: response, model
 """

@@ -32,7 +32,7 @@ class Basis:
         return _values(x, self.first, self.recurrence)
 
     def parts(self, x: ComplexArray) -> FloatArray:
-        """(2, order + 1, len(x)) the same values, real and imaginary parts apart."""
+        """(2, order + 1, len(x)) real and imaginary parts of the same values."""
         return _parts(x, self.first, self.recurrence)
 
     def powers(self) -> FloatArray:

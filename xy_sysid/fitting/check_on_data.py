@@ -1,4 +1,4 @@
-"""A given transfer function against a measured response and signal that it was not fitted to."""
+"""Comparison of a given model with a measured response and signal to which it was not fitted."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class ModelCheck:
 
     frequency, measured, predicted: (m,) trusted lines, Hz; the data; the model through hold and window
     sigmas: (m,) |measured - predicted| in standard deviations of the measurement
-    relative_error: rms of |measured - predicted| / |measured|; noise_floor: the same of the measurement's own sigma
-    rms_sigma, worst_sigma: of the residual in sigma; worst_hz: where
+    relative_error: rms of |measured - predicted| / |measured|; noise_floor: rms of sigma / |measured|
+    rms_sigma, worst_sigma: rms and largest of ``sigmas``; worst_hz: frequency of the largest
     simulation: in the time domain, None if the data are too short
     """
 
@@ -62,7 +62,10 @@ def through_window(tf: TransferFunction, frf: FrequencyResponse, hold: Literal["
 
 
 def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatArray, hold: Literal["zoh", "none"] = "zoh") -> ModelCheck:
-    """Compare at the trusted lines, and simulate the samples. Raises BadInput for other units or no trusted line."""
+    """Compare at the trusted lines, and simulate the samples u, y (n,).
+
+    Raises BadInput for other units, another sampling time, no trusted line, or a response that is not finite.
+    """
     if (tf.input_unit, tf.output_unit) != (frf.input_unit, frf.output_unit):
         given, wanted = (over(item.output_unit, item.input_unit) for item in (tf, frf))
         raise BadInput("unit of the model", given, wanted, "Use a model and a recording of the same units.")
@@ -74,7 +77,7 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
         raise BadInput("number of trusted lines", 0, "1 or more", "Record longer, excite more, or widen the band.")
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         predicted = through_window(tf, lines, hold)
-        usable = bool(np.isfinite(np.sum(np.abs(predicted / lines.response) ** 2)))  # a square that overflows is not a number either
+        usable = bool(np.isfinite(np.sum(np.abs(predicted / lines.response) ** 2)))  # an overflow is not finite either
     if not usable:
         raise BadInput("response of the model", "not finite", "finite in the band of the recording", "Check the coefficients of the model.")
     try:
@@ -86,9 +89,9 @@ def check(tf: TransferFunction, frf: FrequencyResponse, u: FloatArray, y: FloatA
 
 
 def check_motion(velocity: FloatArray, simulated: FrequencyResponse, frf: FrequencyResponse, y: FloatArray) -> ModelCheck:
-    """Any model by its motion: simulated velocity (n - 1,) of the run with output y (n,), and the response of that motion.
+    """Compare any model by its simulated motion: velocity (n - 1,) for the run with output y (n,), and the response of that motion.
 
-    simulated: estimated as ``frf`` was, line by line the same. Raises BadInput without trusted lines.
+    simulated: estimated with the settings of ``frf``. Raises BadInput without trusted lines.
     """
     lines = frf.select(frf.trusted)
     if len(lines) == 0:

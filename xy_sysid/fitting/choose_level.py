@@ -1,7 +1,7 @@
 """Orders of a response that does not fall at its highest lines: a controller or a filter, not a machine from input to motion.
 
-As many zeros as poles, from the simplest upward, with and without delay. An order is taken if it shortens the description clearly; the cost
-counts in units of what the richest stable model leaves, as in ``choose_orders``.
+These have as many zeros as poles. Orders are tested from the simplest upward, with and without delay. An order is accepted if it shortens the
+description by more than ``CLEARLY``, with the cost scaled as in ``choose_orders``.
 """
 
 from __future__ import annotations

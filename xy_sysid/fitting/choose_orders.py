@@ -1,10 +1,10 @@
 """Choice of the orders from a response: from the rigid body with delay upwards, as long as each step is significant and physically plausible.
 
-A step up adds a pole, or a pair with or without its zeros. It is taken if (1) it shortens the description by more than CLEARLY,
-where the cost counts in units of what the richest plausible model leaves (overdispersion: Burnham & Anderson, Model Selection and
-Multimodel Inference, 2nd ed., sec. 2.5, as no real machine is explained by noise alone); (2) near the frequencies that it adds it
-takes away at least half of what noise does not explain, as a real resonance does and a patch on friction does not; and (3) it
-could be a machine: stable, with roots in the band, of which none cancel and none hang on a single line.
+A step adds a pole, or a pair with or without zeros. It is accepted if (1) it shortens the description by more than CLEARLY, where the
+cost is divided by the excess of the best plausible model over noise (overdispersion: Burnham & Anderson, Model Selection and Multimodel
+Inference, 2nd ed., sec. 2.5, as noise alone never explains a real machine); (2) it explains at least half of the misfit near the
+frequencies that it adds, unlike a resonance that only imitates friction; and (3) it is physical: stable, with roots in the band that
+do not cancel, and with a frequency that the data determine.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from xy_sysid.linear.transfer_function import Mode
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.units import derivative_of
 
-STEPS = ((0, 1), (2, 2), (0, 2), (1, 2), (4, 4))  # zeros and poles added at once; two pairs, where one alone finds no minimum
+STEPS = ((0, 1), (2, 2), (0, 2), (1, 2), (4, 4))  # zeros and poles added at once; two pairs if one alone finds no minimum
 MOST_POLES = 9  # in addition to the integrators
 HALF = 0.5  # fraction of the misfit near an added mode that may remain
 NEAR = 1.4  # factor below and above the added frequencies within which the misfit is counted
 LIGHT = 0.7  # damping above which a pair is not a resonance
-NUMBERS_EACH = 4.0  # independent numbers that each parameter of a step needs
+NUMBERS_EACH = 4.0  # independent data that each parameter of a step needs
 WIDEST = 0.1  # relative standard error, including misfit, of a frequency that counts as determined
 FAR_ABOVE = 3.0  # factor above the band's end beyond which a rigid body's pole is not visible
 
@@ -104,7 +104,7 @@ def excess(fit: Fit) -> float:
 
 
 def _rigid(frf: FrequencyResponse, family: Structure) -> Fit:
-    """A mass with drag (or on a spring, without integrators) and delay; with one pole less if the last is not visible, or no stable fit is found."""
+    """A mass with drag (or on a spring, without integrators) and delay; one pole less if the last is not visible, or the fit is unstable."""
     floats = family.integrators == 2 and derivative_of(frf.output_unit) == 2  # a mass without drag responds to a force with its acceleration
     order = 2 if floats else max(2, family.integrators + 1)
     rigid = identify(frf, replace(family, numerator_order=0, denominator_order=order))
@@ -181,7 +181,7 @@ def fit_resolution(fit: Fit) -> float:
 
 
 def _misfit(fit: Fit, richer: Fit, added: tuple[Mode, ...]) -> float:
-    """Cost above noise near the added modes, and near the zeros next to them; all of it for a single pole."""
+    """Cost above noise near the added modes and the zeros next to them; over all lines for a single pole."""
     parts = 0.5 * np.abs(fit.weight * (fit.measured - fit.response)) ** 2
     noise = fit.expected_cost / max(len(parts), 1)
     if all(abs(mode.damping) >= 1.0 for mode in added):

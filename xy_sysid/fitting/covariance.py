@@ -2,9 +2,8 @@
 
 Errors of neighbouring lines are correlated, so the sandwich (J'J)^-1 J' S J (J'J)^-1 with S the covariance of the weighted
 errors (Pintelon & Schoukens, System Identification, 2nd ed., 9.11). S has two parts. Noise: independent of the input,
-correlated by window and overlap alone. Leakage: where the response bends within the window's main lobe, what the measured
-scatter shows is mostly this, and most of it cancels between neighbouring lines and overlapping windows; the model tells how
-much there is (``leakage``).
+correlated by window and overlap alone. Leakage: it dominates the measured scatter where the response varies within the window's
+main lobe, but most of it cancels between neighbouring lines and overlapping windows; its size follows from the model (``leakage``).
 """
 
 from __future__ import annotations
@@ -23,13 +22,13 @@ from xy_sysid.samples.block import FloatArray
 
 BLOCK = 32  # lines whose median noise replaces that of a line dominated by leakage
 DOUBT = 3.0  # noise is estimated on its own line if it is this many standard deviations of sigma^2 above the leakage
-RANK = 1e-11  # a direction with a smaller relative singular value is not estimated: its variance is at least that large
+RANK = 1e-11  # a direction with a smaller relative singular value is not estimated
 
 
 def covariance(task: Problem, at: Point, table: FloatArray) -> tuple[FloatArray, float, float]:
     """((p, p) covariance of b, a, delay, expected cost, its standard deviation); NaN without sigma.
 
-    table: (p + 1, 2 m) as ``damped.weighted`` gives it at the point.
+    table: (p + 1, 2 m) result of ``damped.weighted`` at the point.
     """
     size = table.shape[0] - 1
     if task.sigma is None:
@@ -70,11 +69,11 @@ def _freedom(frf: FrequencyResponse) -> float:
 
 
 def _noise(total: FloatArray, leaks: FloatArray, after: FloatArray, freedom: float) -> FloatArray:
-    """(m,) the part of sigma^2 that is noise; leaks: what leakage adds to sigma^2; after: |factor of the response|^2.
+    """(m,) the part of sigma^2 that is noise; leaks: the part due to leakage; after: |factor of the response|^2.
 
-    freedom: of the leakage's scatter, which smoothing over lines does not steady.
-    Where leakage is nearly all, the difference is chance, and only its lucky half would be positive: the median of the lines
-    around is taken instead.
+    freedom: degrees of freedom of the leakage's scatter, which smoothing over lines does not increase.
+    Where leakage dominates, the difference is random and would be positive on half of the lines only: there the median of the
+    surrounding lines is used.
     """
     rest = total - leaks
     chance = DOUBT * np.sqrt(2.0 / max(freedom, 2.0)) * leaks
@@ -99,7 +98,7 @@ def _places(task: Problem) -> NDArray[np.int64]:
 def error_covariance(task: Problem, at: Point, sigma: FloatArray, place: NDArray[np.int64]) -> tuple[ComplexArray, ComplexArray]:
     """((k, places) E[e_i conj(e_(i + d))], (k, places) E[e_i e_(i + d)]) of the weighted errors of lines d = 0 .. k - 1 apart.
 
-    0 where a line was left out.
+    0 at lines that were left out.
     """
     frf, plan = task.frf, task.plan
     weight, noise = np.zeros((2, int(place[-1]) + 1))
@@ -121,9 +120,9 @@ def _bends(
     near: NDArray[np.complex128], index: NDArray[np.int64], kernel: NDArray[np.float64], after: NDArray[np.complex128],
     seen: NDArray[np.int64], place: NDArray[np.int64], offsets: int,
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64]]:  # fmt: skip
-    """((offsets, places) response around each line less its blurred value, (places,) the scatter that it makes in one window).
+    """((offsets, places) response around each line minus its smoothed value, (places,) the scatter that this causes in one window).
 
-    ``after`` hardly changes within a main lobe, so that it may be multiplied by here.
+    ``after`` hardly changes within a main lobe, so it is applied here.
     """
     size = int(place[-1]) + 1
     bends, single = np.zeros((offsets, size), dtype=np.complex128), np.zeros(size)

@@ -1,4 +1,4 @@
-"""Gauss-Newton and Levenberg-Marquardt on the weighted errors, by orthogonal factors, never by normal equations.
+"""Gauss-Newton and Levenberg-Marquardt on the weighted errors, by orthogonal factors, without normal equations.
 
 Damping as in nllsfdi: lambda from 0.01, halved on success, times 10 on failure; columns scaled, and the damped step found by
 rotations of the triangular factor (More, "The Levenberg-Marquardt algorithm", 1978).
@@ -19,7 +19,7 @@ from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 
 LARGEST_DAMPING = 1e12
-ROUNDING = 1e-26  # a cost below this fraction of the data's own is zero in double precision
+ROUNDING = 1e-26  # a cost below this fraction of the cost of a zero model is zero in double precision
 NEAR_ROUNDING = 1e-20  # below this fraction, a failing step is attributed to rounding
 RANK = 1e-13  # a direction whose factor is below this fraction of the largest is not changed
 
@@ -42,7 +42,7 @@ def weighted(task: Problem, at: Point) -> FloatArray:
 
 
 def minimise(task: Problem, start: Point, options: FitOptions) -> Minimum:
-    """The nearest minimum of half the sum of squared weighted errors. The start must be in its own bases (``rebased``)."""
+    """The local minimum of half the sum of squared weighted errors from a start, which must be in its own bases (``rebased``)."""
     here = model(task, start)
     rows, point = _table(task, here, start), start
     value = _half_square(rows)
@@ -112,7 +112,7 @@ def triangle(rows: FloatArray) -> FloatArray:
 
 
 def _factor(task: Problem, rows: FloatArray, at: Point) -> tuple[FloatArray, FloatArray]:
-    """(R of the scaled table, scales); a delay at its limit that would exceed it is held."""
+    """(R of the scaled table, scales); a delay at its bound is fixed if the step would leave the bounds."""
     upper = triangle(rows)
     scale = np.sqrt(np.sum(upper[:, :-1] ** 2, axis=0))
     scale[~(scale > 0)] = 1.0
@@ -126,7 +126,7 @@ def _factor(task: Problem, rows: FloatArray, at: Point) -> tuple[FloatArray, Flo
 
 @compiled
 def _step(upper: NDArray[np.float64], damping: float) -> tuple[NDArray[np.float64], float]:
-    """(step, reduction of the linearised cost): min |R x - q|^2 + damping |x|^2 with (R, q) the table's factor."""
+    """(step, reduction of the linearised cost): min |R x - q|^2 + damping |x|^2 with (R, q) the triangular factor."""
     size = upper.shape[0] - 1
     r, q = upper[:size, :size].copy(), upper[:size, size].copy()
     if damping > 0.0:

@@ -17,7 +17,7 @@ CONSISTENT = 3.0  # standard deviations
 
 
 def finish(task: Problem, at: Point, method: str, end: Ended, start: str, table: FloatArray | None = None) -> Fit:
-    """Compute the content of a Fit; table: ``damped.weighted`` at the point, if it is already available."""
+    """The Fit at a point; table: ``damped.weighted`` there, if it is already available."""
     structure, plan, frf = task.structure, task.plan, task.frf
     table = weighted(task, at) if table is None else table
     error = table[-1].reshape(2, -1) / task.weight
@@ -96,7 +96,7 @@ def finish(task: Problem, at: Point, method: str, end: Ended, start: str, table:
 
 
 def _failed(task: Problem, at: Point, method: str, end: Ended, start: str) -> Fit:
-    """A Fit without an estimate: numbers were out of range. Everything unknown is NaN."""
+    """A Fit without an estimate, because numbers were out of range; unknown values are NaN."""
     structure, frf, nan = task.structure, task.frf, float("nan")
     lines, names = np.full(len(frf), np.nan), _names(task)
     bottom = np.zeros(structure.free_order + max(structure.power, 0) + 1)

@@ -26,8 +26,8 @@ def identify(
 ) -> Fit:
     """Fit a structure to the trusted lines of a response.
 
-    start: the last model, if there is one: a few milliseconds; a cold start is tried as well when it does not converge.
-    doubt: also when it converges to more than noise explains, which on a real axis is usual, and a cold start is slow
+    start: the last model, if there is one, which takes a few ms; if it does not converge, a cold start is tried too.
+    doubt: True to try the slow cold start also if the cost is above the noise, as is usual on a real axis
     Raises BadInput for too few trusted lines. A fit that fails is a result with ``converged`` False and a reason.
     """
     task = problem(frf, structure)

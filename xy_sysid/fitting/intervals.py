@@ -16,7 +16,7 @@ from xy_sysid.response.frf import Z95, ComplexArray
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import over, position_of
 
-BEYOND = 1e3  # standard error relative to the value from which an interval is shown as unlimited
+BEYOND = 1e3  # standard error relative to the value above which an interval is unlimited
 PAIRS = {"pole": "resonance", "zero": "antiresonance"}
 
 

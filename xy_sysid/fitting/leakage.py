@@ -1,10 +1,10 @@
 """Random errors of a response that varies within the main lobe of the window, and their correlation.
 
-The estimate at a line is the response blurred, plus an error e = mean over windows of conj(X) L / mean |X|^2 with the leakage
+The estimate at a line is the smoothed response plus an error e = mean over windows of conj(X) L / mean |X|^2 with the leakage
 L(f) = integral W(f - v) D_f(v) dZ(v), D_f(v) = G(v) - G_blurred(f). For an input that is locally white and Gaussian
 (Isserlis), summed over pairs of windows k, l,
     E[e conj(e')] = sum conj(E[X_k conj(X'_l)]) E[L_k conj(L'_l)],   E[e e'] = sum E[L_k conj(X'_l)] E[L'_l conj(X_k)]
-Noise has no second part. Here it is what makes errors of a frequency small and those of a damping large.
+The second is 0 for noise. For leakage it makes errors of a frequency small and those of a damping large.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Linear least squares for N and D, plain and re-weighted by the last denominator.
 
 Levy, "Complex-curve fitting", IRE Trans. 1959; Sanathanan & Koerner, IEEE Trans. Automatic Control 8, 1963. Hold, window
-and delay enter by correcting the data with the last model: what it predicts through them, less what it is without them.
+and delay enter as a correction of the data: the difference that they make in the prediction of the last model.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def reweighted(task: Problem, delay: float, steps: int, start: Point | None = No
 def scan(task: Problem, steps: int, options: FitOptions) -> list[tuple[float, float, Point]]:
     """(cost, delay, point) at the best delays, best first: local minima of the cost over a grid of delays.
 
-    Where the largest delay is very many periods of the highest frequency, the lines below a lower one tell first where the fine grid is needed.
+    If the grid has more than ``MOST_DELAYS`` delays, the lines at low frequencies first select those around which the fine grid is searched.
     """
     structure, top = task.structure, float(task.frf.frequency[-1])
     if structure.delay != "free":

@@ -13,7 +13,7 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import FrequencyResponse
 
 DEFAULTS = FitOptions()
-FINER = 10  # the scan over delays: one linear step is only right close to the delay (measured on the paper's machine)
+FINER = 10  # factor for the scan over delays: one linear step is accurate only near the true delay (measured on the paper's machine)
 
 
 def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:

@@ -18,5 +18,5 @@ DEFAULTS = FitOptions()
 
 
 def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
-    """The most likely model, whatever weighting the structure asks for. Raises BadInput for too few lines or no sigma."""
+    """The most likely model, with weights of 1 / sigma instead of those of the structure. Raises BadInput for too few lines or no sigma."""
     return solve(problem(frf, replace(structure, weighting="sigma")), start, options, "ml")

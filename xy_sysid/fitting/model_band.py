@@ -1,7 +1,7 @@
 """Uncertainty of a fitted model's response, line by line.
 
 The covariance of the parameters is carried through the derivatives of the response (first-order propagation; Pintelon & Schoukens,
-System Identification, 2nd ed., sec. 9.3), and widened by what the model leaves beyond noise, as its intervals are.
+System Identification, 2nd ed., sec. 9.3), and widened by ``Fit.misfit``, as its intervals are.
 """
 
 from __future__ import annotations

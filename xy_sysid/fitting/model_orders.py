@@ -42,7 +42,7 @@ def independent_data(frf: FrequencyResponse, lines: int) -> float:
 def try_orders(frf: FrequencyResponse, fit: Fit) -> tuple[OrderTrial, ...]:
     """Structures near that of ``fit``, best first, without those that do not converge.
 
-    The relative degree is kept (a pole and a zero more or less at a time) and varied by one.
+    The relative degree is that of ``fit`` or one more.
     """
     asked = fit.structure
     data = independent_data(frf, len(fit.frequency))
@@ -70,5 +70,5 @@ def _fitted(frf: FrequencyResponse, structure: Structure) -> Fit | None:
 
 
 def description_length(fit: Fit, data: float, scale: float = 1.0) -> float:
-    """Description length, nats; data: independent real numbers; scale: least cost of any model relative to that of noise alone."""
+    """Description length, nats; data: number of independent real data; scale: least cost of any model relative to that of noise alone."""
     return fit.cost / scale + 0.5 * fit.structure.parameters * math.log(max(data, 2.0))

@@ -1,4 +1,4 @@
-"""Poles only: a fast fit of a response, used to watch a resonance."""
+"""A fast fit for the poles only, to monitor a resonance."""
 
 from __future__ import annotations
 

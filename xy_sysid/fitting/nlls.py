@@ -20,9 +20,9 @@ MOST_STARTS = 4  # delays of the scan whose minima are computed if no fit is con
 
 
 def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
-    """The minimum from ``start``, or the best of those from the linear estimators.
+    """The minimum from ``start``, or without one the best minimum from the linear estimators.
 
-    Raises BadInput for too few lines, or a start with another structure.
+    A start with another structure is ignored. Raises BadInput for too few lines.
     """
     return solve(problem(frf, structure), start, options, options.method)
 
@@ -37,10 +37,10 @@ def solve(task: Problem, start: TransferFunction | None, options: FitOptions, na
 
 
 def cold(task: Problem, options: FitOptions) -> Minimum:
-    """The best minimum from several starts, the likeliest first; the search ends when noise explains the cost.
+    """The best minimum from several starts, the most likely first; the search ends when noise explains the cost.
 
-    First the best delay of a scan; then a delay from a rigid axis of the lowest order, from which the full order grows
-    under relative weights: weights of 1 / sigma can hold linear steps in a wrong valley when a pole and zero lie close.
+    First the best delay of a scan. Then the delay of a rigid axis, with a fit of the full order under relative weights: weights of 1 / sigma
+    can keep linear steps in a wrong minimum if a pole and a zero are close. Then the next delays of the scan.
     """
     best: Minimum | None = None
     scanned = scan(task, options.reweightings, options)

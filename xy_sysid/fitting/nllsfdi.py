@@ -35,9 +35,9 @@ class _Data:
 
 
 def fit(frf: FrequencyResponse, structure: Structure, start: TransferFunction | None = None, options: FitOptions = DEFAULTS) -> Fit:
-    """Fit numerator_order over denominator_order powers of s, all poles free; ``start`` is not used, as there.
+    """Fit numerator_order over denominator_order powers of s, all poles free; ``start`` is ignored.
 
-    Integrators, delay, hold and weighting of the structure are set aside. Raises BadInput for too few lines or domain "z".
+    Integrators, delay, hold and weighting of the structure are ignored. Raises BadInput for too few lines or domain "z".
     """
     del start
     if structure.domain != "s":

@@ -13,12 +13,12 @@ USUAL = IdentifierSettings()
 
 
 def is_given(response: FrequencyResponse) -> bool:
-    """True if it was not estimated from windows of samples."""
+    """True if a response was not estimated from windows of samples."""
     return response.resolution == 0.0
 
 
 def settings_for(response: FrequencyResponse, settings: IdentifierSettings) -> IdentifierSettings:
-    """The settings with hold and integrators for a response measured elsewhere, where they have default values."""
+    """The settings; those of hold and integrators that have default values are replaced for a response measured elsewhere."""
     if not is_given(response):
         return settings
     hold = "none" if settings.hold == USUAL.hold else settings.hold

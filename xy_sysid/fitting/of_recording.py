@@ -27,7 +27,7 @@ from xy_sysid.samples.recording import Recording, as_sensed
 from xy_sysid.settings import IdentifierSettings
 from xy_sysid.units import derivative_of
 
-HARDLY = 4.0  # standard deviations of the number of lines that chance makes coherent (neighbours are alike, hence the 2)
+HARDLY = 4.0  # standard deviations of the number of lines that are coherent by chance (neighbours are correlated, hence the 2)
 HALVES = (
     "The input repeats with the other sign every {half} samples ({seconds:.6g} s), half its period: "
     "windows of one period, made of each half and its negative."
@@ -37,7 +37,7 @@ WINDOWS, SHORTEST = 3, 16  # least number of adjacent windows in a record, and s
 LONGEST = 16_384  # samples of a window, if a single one suffices
 MOST_ON_GRID = 0.5  # of the possible windows; if the grid holds fewer, each stretch has windows from its own start
 COVERED = 0.5  # of the samples: least fraction in such windows
-MANY = 6  # periods needed if feedback or friction shape the input
+MANY = 6  # periods needed if feedback or friction affects the input
 MOST_TRANSIENT = 2  # largest number of periods of a stretch from which none is left out
 BEST = "Several realisations of a periodic input: noise and nonlinear distortion are separated, and sigma is the larger of the two."
 TRANSIENT = 1  # periods left out at the start of a periodic recording
@@ -64,8 +64,8 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     """The response of one axis in the quantity that its sensor reads, by the method that ``settings.response`` names.
 
     period: samples of a period (the window becomes one period, without a taper), 0 to look for one, None for none
-    Windows in which the encoder stands still or leaps are left out, as online, and a note says so.
-    Raises BadInput if the axis is not there, was not excited, or the data are too short for one window.
+    Windows in which the encoder stands still or jumps are left out, as online, and a note says so.
+    Raises BadInput if the axis is missing, was not excited, or the data are too short for one window.
     """
     u, y = recording.axis(axis)
     method = METHODS[settings.response]
@@ -162,7 +162,7 @@ def _sensed(recording: Recording, y: FloatArray, period: int, sign: float = 1.0)
 
 
 def _distorted(recording: Recording, axis: str, rows: slice) -> bool:
-    """True if feedback or friction shape the input: their contribution is periodic too, and few periods cannot separate it from the response."""
+    """True if feedback or friction affects the input: this contribution is periodic too, and few periods cannot separate it from the response."""
     u, y = recording.axis(axis)
     return bool(_closed_loop(recording, axis) or friction_note(friction_hint(u[rows], y[rows], recording.sampling_rate)))
 
@@ -194,9 +194,9 @@ def _moving(axis: str, u: FloatArray, y: FloatArray, units: tuple[str, str], nam
 
 
 def _fitting(settings: IdentifierSettings, runs: list[slice], notes: list[str], tapered: bool) -> IdentifierSettings:
-    """The settings with a window that fits often enough into the record; unchanged if the user chose a length.
+    """The settings with a window of which enough fit into the record; unchanged if the user chose a length.
 
-    tapered: several windows are averaged; otherwise lines are, so that one window suffices, and a longer one gives finer lines
+    tapered: several windows are averaged; otherwise lines are averaged, so one long window suffices
     """
     if settings.length != USUAL.length:
         return settings
@@ -229,7 +229,7 @@ def _possible(settings: IdentifierSettings, rate: float, samples: int) -> None:
 
 
 def _fits(recording: Recording, runs: list[slice], shape: WindowShape, differenced: bool) -> bool:
-    """True if the grid of windows (see ``windows``) holds most of those that fit into the runs; short ones may lie between two."""
+    """True if the grid of windows (see ``windows``) holds at least half of those that fit into the runs; a short run may fall between two."""
     needed = shape.length + int(differenced)
     rooms = [(_samples(run) - needed, -int(recording.seq[run.start]) % shape.hop) for run in runs if _samples(run) >= needed]
     on_grid = sum((room - first) // shape.hop + 1 for room, first in rooms if room >= first)
@@ -258,7 +258,7 @@ def _coherence(frf: FrequencyResponse, settings: IdentifierSettings, periodic: b
 def _periodic(
     settings: IdentifierSettings, runs: list[slice], period: int, notes: list[str], rate: float, what: str
 ) -> tuple[IdentifierSettings, list[slice]]:
-    """Settings for a periodic signal. what: the periodic signal, the input or the reference."""
+    """Settings and runs for a periodic signal. what: its name, the input or the reference."""
     first = runs[0]
     if (first.stop - first.start) // period > TRANSIENT + 1:
         runs = [slice(first.start + TRANSIENT * period, first.stop), *runs[1:]]
@@ -274,7 +274,7 @@ def replace_settings(settings: IdentifierSettings, **values: object) -> Identifi
 
 
 def _closed_loop(recording: Recording, axis: str) -> list[str]:
-    """A reference in the recording means feedback: H1 is then biased towards minus the inverse controller."""
+    """A note if the input follows the tracking error: with such feedback H1 is biased towards minus the inverse controller."""
     if recording.reference is None:
         return []
     column = recording.axes.index(axis)
@@ -327,7 +327,7 @@ def fitted(frf: FrequencyResponse, settings: IdentifierSettings) -> Fit:
 
 
 def split(recording: Recording, held_out: float) -> tuple[Recording, Recording]:
-    """The first part, for the fit, and the last ``held_out`` (0..0.9) of the samples, which are held out."""
+    """The first part, for the fit, and the last ``held_out`` (0..0.9) of the samples. Raises BadInput out of this range."""
     if not 0.0 <= held_out <= 0.9:
         raise BadInput("held-out part", held_out, "0 to 0.9", "Choose for example 0.2.")
     cut = len(recording) - round(held_out * len(recording))

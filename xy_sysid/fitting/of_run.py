@@ -111,7 +111,7 @@ def frf(data: Run | Recording, period: int | None = 0, **settings: Any) -> Frequ
 
 
 def fit(response: FrequencyResponse, method: str = "best", **settings: Any) -> LinearModel:
-    """A transfer function with delay, its 95 % intervals and its verdicts.
+    """A fitted transfer function with delay, 95 % intervals and verdicts.
 
     method:   best (maximum likelihood), lls, iwls, nlls, ml, nllsfdi
     settings: any of the identifier's, for example numerator_order=2, denominator_order=3, delay=False

@@ -22,20 +22,20 @@ NO_WEIGHT = 1e-15  # weights of the window below this fraction of the largest ar
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Where the model is evaluated, and how that becomes the prediction on the lines.
+    """Where the model is evaluated, and the factors that give the prediction on the lines.
 
     scale:       rad/s that the variable s is divided by (1 in the z domain)
     period:      sampling time, s
     line:        (m,) the model's variable (scaled s, or z) on the lines
     line_omega:  (m,) rad/s
     line_factor: (m,) complex: prediction without aliases, window and delay = line_factor * N / D
-    grid:        (g,) the model's variable where it is evaluated; the kernel asks for it
+    grid:        (g,) the model's variable at the frequencies that the window needs
     omega:       (g,) rad/s
     main:        (g,) factor of N / D exp(-j w delay) at the grid
     fold:        (g,) factor of the sum of aliases at the grid
-    index:       (j, m) rows of the grid that a line needs (the window reaches below 0 Hz near it)
-    kernel:      (j,) weights of the window; seen: (j,) their places in FrequencyResponse.kernel_weight
-    after:       (m,) factor of the blurred response: the division by the difference's response
+    index:       (j, m) rows of the grid for each line (near 0 Hz the window reaches below it)
+    kernel:      (j,) weights of the window; seen: (j,) their indices in FrequencyResponse.kernel_weight
+    after:       (m,) factor of the smoothed response: 1 over the response of the difference
     alias:       (nodes * 2 ALIASES,) scaled s of the aliases, grouped by node; alias_omega: rad/s
     alias_factor: (same,) 1 / (s sigma^integrators)
     alias_number: (2 ALIASES,) k

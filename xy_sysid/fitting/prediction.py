@@ -23,7 +23,7 @@ TAIL_REACH = 0.5  # the series in 1 / s is used if every pole is within this fra
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A plan with a basis: what is needed to evaluate parameters on it.
+    """A plan with two bases and their values on it, for the evaluation of parameters.
 
     numerator, denominator: the bases; *_top: (order + 1, SERIES) their highest powers
     *_grid, *_alias: (2, order + 1, points) real and imaginary parts of their values
@@ -73,7 +73,7 @@ def predict(model: Model, b: FloatArray, a: FloatArray, delay: float) -> Complex
 
 
 def unblurred(model: Model, b: FloatArray, a: FloatArray, delay: float) -> ComplexArray:
-    """(grid,) the response of what was transformed, before the window blurs it."""
+    """(g,) predicted response on the grid, before smoothing by the window."""
     plan = model.plan
     rows = np.arange(plan.omega.size)[None, :]
     bare = replace(model, plan=replace(plan, index=rows, kernel=np.ones(1), after=np.ones(plan.omega.size, dtype=np.complex128)))
@@ -106,7 +106,7 @@ def _fractions(
 ) -> None:  # fmt: skip
     """Add factor * (N / D, its derivatives to b, a[:-1] and, with s = j omega, the delay) at each point.
 
-    out: (width, 2, points), values: (2, order + 1, points), factor: (2, points). Loops over points inside, for vector units.
+    out: (width, 2, points), values: (2, order + 1, points), factor: (2, points). Inner loops are over points, for vectorisation.
     """
     size = omega.shape[0]
     top, bottom, work = np.zeros((2, size)), np.zeros((2, size)), np.empty((6, size))
@@ -156,7 +156,7 @@ def _tail(
     """Add the aliases beyond the last, from the series of N / D in 1 / s; out: (width, 2, points), sums: (points, SERIES + 1)."""
     size = n_top.shape[1]
     up, down = np.zeros(size), np.zeros(size)
-    for i in range(b.shape[0]):  # a polynomial of lower order starts lower in the series
+    for i in range(b.shape[0]):  # a polynomial of lower order starts later in the series
         for j in range(size):
             up[j] += b[i] * n_top[i, j]
     for i in range(a.shape[0]):

@@ -75,7 +75,7 @@ def problem(frf: FrequencyResponse, structure: Structure) -> Problem:
 
 
 def of_quantity(structure: Structure, frf: FrequencyResponse) -> Structure:
-    """The same family for a response of position, velocity or acceleration; the last would jump with a held input, so nothing is held."""
+    """The same family for a response of position, velocity or acceleration; without hold for acceleration, which would jump with a held input."""
     derivative = derivative_of(frf.output_unit) if structure.domain == "s" else 0
     if derivative == structure.derivative:
         return structure
@@ -112,7 +112,7 @@ def rebased(task: Problem, at: Point) -> Point:
 
 
 def in_bases(task: Problem, n_values: ComplexArray, d_values: ComplexArray, delay: float, factor: FloatArray) -> Point:
-    """The model with these values of N and D on the lines; factor weighs N in a line's error."""
+    """The model with these values of N and D on the lines; factor: (m,) weight of N in each line's error."""
     structure, line = task.structure, task.plan.line
     own = factor * np.abs(n_values / d_values)
     own = np.maximum(own, 1e-9 * float(np.max(own)))
@@ -124,7 +124,7 @@ def in_bases(task: Problem, n_values: ComplexArray, d_values: ComplexArray, dela
 
 
 def _project(values: ComplexArray, target: ComplexArray, weight: FloatArray) -> FloatArray:
-    """Coefficients of a polynomial in a basis that is orthonormal under the weight, and once more of what was left by rounding."""
+    """Coefficients of a polynomial in a basis that is orthonormal under the weight, with one correction of rounding errors."""
     rows = np.ascontiguousarray((values * weight[:, None]).T)
     goal = target * weight
     first: FloatArray = np.asarray((rows.conj() @ goal).real)
@@ -132,7 +132,7 @@ def _project(values: ComplexArray, target: ComplexArray, weight: FloatArray) -> 
 
 
 def from_transfer_function(task: Problem, tf: TransferFunction) -> Point | None:
-    """The point of a given model, or None if it is not of the structure (other domain, orders or integrators)."""
+    """The point of a given model; None if its domain, orders or integrators differ from the structure."""
     structure = task.structure
     numerator, denominator = tf.numerator[np.argmax(tf.numerator != 0) :], tf.denominator[np.argmax(tf.denominator != 0) :]
     if (tf.sampling_time is None) != (structure.domain == "s") or not numerator.size or numerator.size > structure.numerator_order + 1:

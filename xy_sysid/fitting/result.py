@@ -26,7 +26,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How an estimator came to its end, and whether that is a minimum to trust."""
+    """The end of an estimator; converged: whether it is a minimum."""
 
     iterations: int
     converged: bool
@@ -39,20 +39,20 @@ class Fit:
 
     frequency, measured, response, weight: (m,) the trusted lines, Hz; the data; the prediction through the window; 1 / error
     cost:            half the sum of squared weighted errors
-    expected_cost:   what the measured sigma lets expect of a model that misses nothing, and
-    cost_deviation:  its standard deviation; NaN without a sigma
-    consistent:      cost within 3 deviations (or below); None when it cannot be judged
+    expected_cost:   the cost due to noise of the measured sigma alone
+    cost_deviation:  its standard deviation; both are NaN without a sigma
+    consistent:      cost at most 3 deviations above the expected one; None if that is unknown
     relative_error:  rms of |measured - response| / |measured|
     error_cost:      the paper's name for relative_error, per cent
-    confidence:      what the paper calls "parameter confidence", 100 - error_cost; not a confidence interval
+    confidence:      the paper's "parameter confidence", 100 - error_cost; not a confidence interval
     parameters:      names of the free coefficients and the delay, and their (p, p) covariance
     jacobian:        (2 m, p) weighted derivatives of the real and imaginary parts of the prediction to the parameters
     poles, zeros:    rad/s (z in the z domain), integrators included
-    intervals:       95 % intervals of coefficients, delay, gain, poles, zeros, resonances and antiresonances, as if noise were all
-                     that the model leaves; see ``intervals_with_misfit``
-    converged, reason: False when no trustworthy minimum was found, and why
+    intervals:       95 % intervals of coefficients, delay, gain, poles, zeros, resonances and antiresonances, for noise alone;
+                     see ``intervals_with_misfit``
+    converged, reason: False if no minimum was found, and why
     warnings:        what a user should know, one sentence each
-    start:           where it began
+    start:           origin of the start value, in words
     """
 
     tf: TransferFunction
@@ -91,10 +91,10 @@ class Fit:
 
     @property
     def misfit(self) -> float:
-        """How many times too narrow the intervals of noise alone are: root of cost over expected cost (Birge, Phys. Rev. 40, 1932).
+        """Factor by which the intervals for noise alone are too narrow: root of cost over expected cost (Birge, Phys. Rev. 40, 1932).
 
-        1 where noise explains the cost, NaN where that cannot be judged. A factor far from 1 means that the model fails: even the
-        widened intervals are then an order of magnitude, since what a model leaves is no noise.
+        1 if noise explains the cost, NaN if that is unknown. If the factor is far above 1, the model fails, and even the widened intervals
+        are only an order of magnitude.
         """
         if self.consistent is None or not self.expected_cost > 0.0:
             return float("nan")
@@ -102,7 +102,7 @@ class Fit:
 
     @property
     def intervals_with_misfit(self) -> tuple[Interval, ...]:
-        """The intervals, widened by ``misfit``; NaN bounds where it is not known."""
+        """The intervals, widened by ``misfit``; NaN bounds if it is unknown."""
         factor = self.misfit
         return tuple(
             replace(

@@ -16,16 +16,15 @@ LARGEST_ORDER = 12
 class Structure:
     """The family of models that a fit chooses from.
 
-    numerator_order, denominator_order: orders, integrators counted in the denominator's
+    numerator_order, denominator_order: orders; that of the denominator includes the integrators
     integrators: poles fixed at s = 0 (z = 1)
     delay:       "free" to estimate it, or its value in s; whole samples in the z domain
-    delay_max:   largest delay looked for, s
+    delay_max:   largest delay of the search, s
     hold:        "zoh": the input is constant between samples; "none": it is band-limited (s domain only)
     domain:      "s" continuous or "z" discrete
     weighting:   of one line's error: "sigma" 1 / sigma, "relative" 1 / |FRF| (the paper's), "uniform" 1
-    derivative:  of the position in the response: 0, 1 where it is of a velocity, 2 of an acceleration; orders and integrators are
-                 those of the position
-    Raises BadInput for orders that make no sense.
+    derivative:  0 for a response of position, 1 of velocity, 2 of acceleration; orders and integrators are those of the position
+    Raises BadInput for values out of range.
     """
 
     numerator_order: int = 2
@@ -64,7 +63,7 @@ class Structure:
 
     @property
     def free_delay(self) -> bool:
-        """True if the delay is a real-valued parameter (in the z domain it is a whole number, found by trial)."""
+        """True if the delay is a real-valued parameter; in the z domain it is a whole number of samples, found by a scan."""
         return self.delay == "free" and self.domain == "s"
 
     @property
@@ -74,7 +73,7 @@ class Structure:
 
 
 def structure_from(settings: IdentifierSettings) -> Structure:
-    """The model family that the settings ask for; orders that are left to the data are 2/4 until ``choose_orders`` has seen them."""
+    """The model family of the settings; orders that are left to the data are 2/4 until ``choose_orders`` chooses them."""
     return Structure(
         numerator_order=settings.orders[0],
         denominator_order=settings.orders[1],
@@ -90,8 +89,8 @@ class FitOptions:
 
     method:          of the non-linear estimators
     max_iterations:  of the non-linear estimators
-    relative_change: they stop when the cost changes by less than this part
-    damping:         first lambda of Levenberg-Marquardt; halved on success, times 10 on failure (nllsfdi's rule)
+    relative_change: they stop when the cost changes by less than this fraction
+    damping:         first lambda of Levenberg-Marquardt; halved on success, multiplied by 10 on failure (nllsfdi's rule)
     reweightings:    re-weighted linear steps of IWLS
     refine_delay:    linear estimators find a free delay by a line search; off keeps the best delay of the scan
     delay_step:      of the scan over delays, in periods of the highest frequency

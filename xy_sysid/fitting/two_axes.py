@@ -15,15 +15,15 @@ from xy_sysid.settings import IdentifierSettings
 SIDE_BY_SIDE = 6  # windows that the record holds at least
 SHORTEST = 64  # samples
 USUAL = IdentifierSettings().length
-LONGEST = LONGER * USUAL  # samples of a window, as of the live machine: beyond it more windows say more than longer ones
+LONGEST = LONGER * USUAL  # samples of a window, as in live operation: beyond it more windows are better than longer ones
 
 
 def coupling_in(recording: Recording, settings: IdentifierSettings, combine: str = "") -> Coupling:
     """The coupling. combine: see ``coupling``; raises BadInput as it does.
 
-    Windows are the longest power of two of which SIDE_BY_SIDE fit, LONGEST at most, unless the settings say otherwise: bands average lines
-    here, so the longer a window is, the less the response of the own axis leaks into the coupling. Of inputs that repeat themselves only one period
-    counts: the others tell the two axes apart no further.
+    Unless the settings give a length, it is the largest power of two of which SIDE_BY_SIDE windows fit, LONGEST at most: a longer window reduces
+    the leakage of each axis' own response into the coupling. Only one period of periodic inputs counts, because the others add nothing that
+    distinguishes the two axes.
     """
     length = settings.length
     if length == USUAL:
@@ -36,15 +36,15 @@ def coupling_in(recording: Recording, settings: IdentifierSettings, combine: str
 
 
 def _distinct(inputs: FloatArray) -> int:
-    """How many samples of two inputs (n, 2) come before they repeat themselves."""
+    """Number of samples of two inputs (n, 2) before both repeat, minus 1."""
     periods = [find_period(one) or len(inputs) for one in inputs.T]
     return max(min(math.lcm(*periods), len(inputs)) - 1, 0)
 
 
 def _needed(found: Coupling, longer: float) -> float:
-    """Seconds with which the limit would come down to SUFFICES, where a longer recording has longer windows first, up to so many times.
+    """Duration of a recording, s, that lowers the limit of the coupling to SUFFICES; longer: factor by which windows can still grow.
 
-    As windows grow, each band averages the powers of more lines, and the limit falls with the fourth root of the time; then with the root.
+    While windows grow, each band averages the powers of more lines, and the limit falls with the fourth root of the time; then with the root.
     """
     above = max(found.largest / SUFFICES, 1.0)
     return found.seconds * above**4 if above < longer**0.25 else found.seconds * longer * (above / longer**0.25) ** 2

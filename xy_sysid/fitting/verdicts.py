@@ -19,19 +19,19 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import readable
 
 TAIL = 0.05  # part of the lines that may lie outside their own 95 % region
-FAR_BELOW = 0.2  # of the expected cost: noise alone gives that once in many thousand fits when more than
-ENOUGH = 10.0  # is expected
-FAR_ABOVE = 3.0  # times the band's end beyond which a pole or zero is not determined by the data
-NEARLY_CANCEL = 0.02  # relative distance of a pole and a zero that cancel for all that the data show
+FAR_BELOW = 0.2  # of the expected cost: noise alone gives less once in many thousand fits, if the expected cost is above ENOUGH
+ENOUGH = 10.0
+FAR_ABOVE = 3.0  # times the band's end, above which the data do not determine a pole or zero
+NEARLY_CANCEL = 0.02  # relative distance of a pole and a zero that the data cannot distinguish
 FLAT = 1e-4  # singular value of the scaled Jacobian, of the largest, below which a combination is not determined
-GOOD_SIMULATION = 70.0  # NRMSE fit in per cent that counts as a model good enough to simulate with
+GOOD_SIMULATION = 70.0  # NRMSE fit, per cent, from which a model is good enough for simulation
 
-NUMBERS_EACH = 2.0  # independent numbers for each parameter, below which nothing is judged
+NUMBERS_EACH = 2.0  # independent data for each parameter, below which nothing is judged
 TRUSTED = 1.5  # times wider: beyond this, the model error and not the noise determines the intervals
 UNTOLD = "Cannot be determined from so few values: {}."
 
 HeldOut = tuple[FloatArray, FloatArray, float]
-"""Input (n,), output (n,) and sampling rate of data that the fit has not seen."""
+"""Input (n,), output (n,) and sampling rate, Hz, of data that were not used for the fit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +46,9 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Validation:
-    """All verdicts; orders tried; the error of a simulation on data not used for the fit (None without such data).
+    """All verdicts; tested orders; the error of a simulation on held-out data (None without such data); pade4: the model with a Pade delay.
 
-    trustworthy: the data tell the parameters, and noise nearly explains what the model leaves, so that the intervals mean something
+    trustworthy: True if the data suffice, the fit converged, and noise nearly explains the residual error, so that the intervals are valid
     """
 
     verdicts: tuple[Verdict, ...]
@@ -64,9 +64,9 @@ class Validation:
 
 
 def validate(fit: Fit, frf: FrequencyResponse, unseen: HeldOut | None = None, orders: bool = True, choice: Choice | None = None) -> Validation:
-    """Check a fit against its response and, if there are any, against samples that it has not seen.
+    """Check a fit with its response and, if there are any, with held-out samples.
 
-    orders: try others near those of the fit; choice: how its orders were chosen, if they were: then no others are tried
+    orders: test others near those of the fit; choice: the choice of its orders, if there was one: then no others are tested
     """
     if choice is not None:
         tried = choice.tried
@@ -90,7 +90,7 @@ def validate(fit: Fit, frf: FrequencyResponse, unseen: HeldOut | None = None, or
 
 
 def _few(fit: Fit, frf: FrequencyResponse) -> Verdict | None:
-    """Too little to tell anything, or None."""
+    """The verdict on too few data; None if they suffice."""
     data, parameters = independent_data(frf, len(fit.frequency)), fit.structure.parameters
     if data >= NUMBERS_EACH * parameters:
         return None
@@ -140,7 +140,7 @@ def _residual(fit: Fit, frf: FrequencyResponse) -> Verdict:
 
 
 def _identifiable(fit: Fit) -> Verdict:
-    """Small singular values of the Jacobian with unit columns: a combination of parameters that the data do not see."""
+    """A small singular value of the Jacobian with unit columns belongs to a combination of parameters that the data do not determine."""
     norms = np.linalg.norm(fit.jacobian, axis=0)
     if not bool(np.all(np.isfinite(norms))) or bool(np.any(norms == 0.0)):
         blind = [name for name, norm in zip(fit.parameters, norms, strict=True) if not norm > 0.0]
@@ -194,7 +194,7 @@ def _cancelled(fit: Fit) -> Verdict:
 
 
 def _feasible(fit: Fit) -> Verdict:
-    """A passive axis has a gain, and damping that is not negative; the paper's own printed denominators fail here."""
+    """A passive axis has a finite gain and no negative damping; the denominators printed in the paper fail here."""
     problems = [f"{item.name} is {item.value:.3g}" for item in fit.intervals if item.name.endswith(".damping") and item.high < 0.0]
     if any(c < 0 for c in fit.tf.denominator) and fit.tf.sampling_time is None:
         problems.append("the denominator has a negative coefficient, read literally as negative mass, damping or stiffness")
@@ -242,7 +242,7 @@ def _simulated(fit: Fit, unseen: HeldOut | None) -> SimulationError | None:
         return None
     u, y, rate = unseen
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model runs away, and the figure says so
+        with np.errstate(over="ignore", invalid="ignore"):  # an unstable model diverges, and the figure says so
             return simulation_error(fit.tf, rate, u, y, hold=fit.structure.hold)
     except BadInput:
         return None
@@ -254,7 +254,7 @@ def _simulation(error: SimulationError) -> Verdict:
 
 
 def simulation_sentence(error: SimulationError) -> str:
-    """How much of a measured signal a simulation explains; lengths in mm."""
+    """A sentence on how much of a measured signal a simulation explains; lengths in mm."""
     scale, unit = readable(error.unit)
     if not np.isfinite(error.nrmse):
         return f"simulated over {error.seconds:.3g} s: the simulation diverges, or the model has another scale."

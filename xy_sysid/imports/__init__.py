@@ -4,16 +4,16 @@ reading:              options for reading a file: the meaning of columns
 bag, paired_streams:  two streams of a bag, paired by sample number
 registry:             which reader reads which file, one row per format
 csv, arrays, twincat, codesys, mitsubishi, json_log: files as sheets of columns
-libraries, guarded, leaves: formats read by other packages, in a separate process, as sheets of columns
+libraries, guarded, leaves: formats that other packages read, in a separate process, as sheets of columns
 several_files, own_times: columns from several files, and columns with their own times, as one table
 sheet, names, roles:  the role of each column, from its name or from the user
 sheet_table, table, even: columns in SI, numbered by their time, which may be uneven
 clock:                time against the sample counter
 foreign_units, given: units of foreign files
 motion:               velocity and acceleration become position
-plausible:            sentences about implausible data
+plausible:            warnings about implausible data
 several, listing:     several recordings as one; the content of a file
-in_parts:             a long recording as parts, one after another
+in_parts:             a long recording, part by part
 limits:               maximum size of a file in memory
 """
 
@@ -48,12 +48,12 @@ __all__ = ["TABLES", "Reading", "blocks", "format_of", "load", "save", "sheet_of
 def load(path: Path | str, reading: Reading | None = None, *, progress: Callable[[float], None] | None = None, **options: Any) -> Recording:
     """A recording from a rosbag2 (folder or file) or any file of ``registry.FORMATS``, paired, checked and in SI.
 
-    reading:  which columns mean what, which part and which axes; see ``Reading``, whose fields may also be given by keyword
-    progress: called with the part that has been read, 0..1
-    Raises BadRecording (the file) or BadInput (an argument), one line each. What was odd is in ``notes``.
+    reading:  the meaning of columns, the part and the axes to read; see ``Reading``, whose fields may also be given by keyword
+    progress: called with the fraction that has been read, 0..1
+    Raises BadRecording (the file) or BadInput (an argument), one line each. Irregularities of the file are in ``notes``.
     """
     path, reading = Path(path), dataclasses.replace(reading or Reading(), **options)
-    with np.errstate(all="ignore"):  # damaged numbers are left out or said, and numpy need not add a word to it
+    with np.errstate(all="ignore"):  # damaged numbers are left out or reported, so numpy need not warn
         try:
             kind = format_of(path)
             result = load_bag(path, reading, progress) if kind is BAG else cut(*from_table(path, kind, reading), reading.start, reading.stop)
@@ -65,14 +65,14 @@ def load(path: Path | str, reading: Reading | None = None, *, progress: Callable
 
 
 def finished(path: Path, result: Recording) -> Recording:
-    """A recording, or a part of one, as people get it: positions, without dead parts, and with remarks on what looks wrong."""
+    """A recording or a part of one for the user: with positions, without dead parts, with warnings about implausible data."""
     result = without_dead_parts(meaningful(path, result))
     output, moved = result.position, as_position(result)
     return dataclasses.replace(moved, notes=(*moved.notes, *remarks(moved, output)))
 
 
 def from_table(path: Path, kind: Format, reading: Reading) -> tuple[Recording, float]:
-    """The whole of a table, and the instant from which its parts count."""
+    """A whole table, and the instant from which times of its parts count, s."""
     topics = reading.voltage_topic, reading.position_topic, reading.joint_topic
     if reading.effort_as_voltage or reading.velocity or reading.joints or reading.effort_lag or topics != (VOLTAGE, POSITION, None):
         raise BadInput("--topic, --effort, --velocity or --joint", f"for {path}", "for a bag", "A table has columns: choose them with --map.")
@@ -85,9 +85,9 @@ def from_table(path: Path, kind: Format, reading: Reading) -> tuple[Recording, f
 
 
 def save(recording: Recording, path: Path | str) -> None:
-    """Write a recording so that ``load`` gives the same back: .csv, .npz, .mat, a bare .db3 or .mcap, or else a bag's folder; whole or not at all.
+    """Write a recording that ``load`` restores: .csv, .npz, .mat, a bare .db3 or .mcap, or a bag's folder; completely or not at all.
 
-    Raises BadRecording if the path exists (bags) or cannot be written, BadInput for an ending that is not known.
+    Raises BadRecording if the path exists (bags) or cannot be written, BadInput for an unknown ending.
     """
     path = Path(path)
     writer = writer_of(path)
@@ -102,7 +102,7 @@ def save(recording: Recording, path: Path | str) -> None:
 
 
 def writer_of(path: Path) -> Callable[[Path, Recording], None]:
-    """What writes such a file; raises BadInput for an ending that is not known."""
+    """The writer of a file by its ending; raises BadInput for an unknown ending."""
     writers = {".csv": csv.write, ".npz": arrays.write_npz, ".mat": arrays.write_mat, ".db3": _write_bag, ".mcap": _write_bag, "": _write_bag}
     if path.suffix not in writers:
         allowed = f"{', '.join(ending for ending in writers if ending)}, or none for a rosbag2 folder"
@@ -111,7 +111,7 @@ def writer_of(path: Path) -> Callable[[Path, Recording], None]:
 
 
 def blocks(recording: Recording, rows: int = ROWS) -> list[tuple[Block, Block]]:
-    """(voltage, position) blocks of up to ``rows`` samples; none reaches over a gap."""
+    """(voltage, position) blocks of up to ``rows`` samples, without gaps."""
     return [(a, b) for a, b, _ in _blocks(recording, rows)]
 
 
@@ -130,7 +130,7 @@ def _blocks(recording: Recording, rows: int) -> list[tuple[Block, Block, slice]]
 def _write_bag(path: Path, recording: Recording) -> None:
     units = {"input_unit": recording.input_unit, "output_unit": recording.output_unit}
     custom = units if (recording.input_unit, recording.output_unit) != ("V", "m") else {}
-    if recording.machine and not path.suffix:  # a bare file has no place for it
+    if recording.machine and not path.suffix:  # a bare file has no field for it
         custom = {**custom, "machine": recording.machine}
     earliest = float(recording.time.min()) if len(recording) else 0.0
     shift = min(0.0, earliest)  # a bag's clock has no negative times

@@ -1,5 +1,5 @@
 """NPZ and MAT: ``t`` or ``time`` (s), ``u`` or ``voltage``, ``y`` or ``position``, ``fs`` (Hz), ``u_unit``, ``y_unit``,
-``r`` or ``reference``, ``axes``, ``seq``; two-dimensional u and y hold several axes. Anything else is a sheet of columns."""
+``r`` or ``reference``, ``axes``, ``seq``; two-dimensional u and y hold several axes. Other files are sheets of columns."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ INPUTS, OUTPUTS, REFERENCES = ("u", "voltage", "InputData"), ("y", "position", "
 TIMES = ("t", "time", "SamplingInstants")
 INPUT_UNITS, OUTPUT_UNITS = ("u_unit", "voltage_unit", "InputData_unit", "InputUnit"), ("y_unit", "position_unit", "OutputData_unit", "OutputUnit")
 TIME_UNITS = ("t_unit", "TimeUnit")
-RATES = ("fs", "samplingrate", "samplerate", "samplingfrequency", "samplefrequency", "fsample", "rate")  # as ``_plain`` writes them
+RATES = ("fs", "samplingrate", "samplerate", "samplingfrequency", "samplefrequency", "fsample", "rate")  # in the spelling of ``_plain``
 PERIODS = ("ts", "dt", "samplingperiod", "sampleperiod", "samplingtime", "sampletime", "tsample", "samplinginterval", "sampleinterval")
 QUOTED = re.compile(r'"([^"]*)"')
 DULL = re.compile(r"Model Root|(In|Out)\d+", re.IGNORECASE)  # parts of a block's path that carry no information
@@ -44,7 +44,7 @@ VALUES, LABELS, UNITS = ("Data", "data", "values", "Values"), ("Name", "name", "
 
 
 def read_npz(path: Path) -> Arrays:
-    """The arrays of an .npz file, none larger than it says and all together not larger than fits; raises BadRecording."""
+    """The arrays of an .npz file. Raises BadRecording if they do not fit in memory, or if an array is smaller than its header says."""
     try:
         with path.open("rb") as raw:
             if raw.read(6) == b"\x93NUMPY":
@@ -76,7 +76,7 @@ def _line(error: BaseException) -> str:
 
 
 def group(path: Path, leaves: Arrays) -> Arrays:
-    """The leaves of the one struct that holds a recording under the contract's names, without its own name; else all as they are."""
+    """The leaves of the only struct with the contract's names, without the struct's name; otherwise all leaves. Raises BadRecording for several."""
     if _has(leaves):
         return leaves
     inside: dict[str, dict[str, NDArray[Any]]] = {}
@@ -97,7 +97,7 @@ def _has(arrays: Arrays) -> bool:
 
 
 def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table | None:
-    """What arrays with the contract's names say; None if there are no such, or if others are to be taken."""
+    """The table of arrays with the contract's names; None if there are none, or if columns were chosen."""
     arrays, path = sheet.arrays, sheet.path
     if arrays is None or reading.columns:
         return None
@@ -130,7 +130,7 @@ def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table | None:
 def _sides(
     path: Path, arrays: Arrays, rows: int | None, wanted: Sequence[str] | None
 ) -> tuple[FloatArray, FloatArray, FloatArray | None, tuple[str, ...]]:
-    """Input, output and reference, (n, axes) each and the reference only if it has their shape, and the names of the axes that are wanted."""
+    """Input, output and reference (only if it has their shape), (n, axes) each, and the names of the chosen axes."""
     input_name, output_name = (next(name for name in names if name in arrays) for names in (INPUTS, OUTPUTS))
     inputs, outputs = (_matrix(path, name, arrays[name], rows) for name in (input_name, output_name))
     if inputs.shape[1] != outputs.shape[1]:
@@ -148,7 +148,7 @@ def _sides(
 def _time(
     path: Path, arrays: Arrays, reading: Reading, stamps: tuple[str | None, FloatArray | None], notes: list[str]
 ) -> tuple[FloatArray | None, float | None]:
-    """Instants in s and the rate in Hz, as far as they are said. stamps: name and numbers of the time."""
+    """Instants, s, and rate, Hz, as far as the file gives them. stamps: name and numbers of the time."""
     (name, time), fs = stamps, rate_of(arrays)
     if time is None and fs is None and reading.rate is None:
         said = next((f"{name} ({value})" for name, value in arrays.items() if _plain(name) in RATES), "fs")
@@ -163,7 +163,7 @@ def _time(
 
 
 def _si(side: tuple[str, FloatArray, str], path: Path, axes: tuple[str, ...], reading: Reading, notes: list[str]) -> tuple[FloatArray, Unit]:
-    """(n, axes) in SI and the unit. side: role, values (n, axes), unit by the file."""
+    """(n, axes) in SI and the unit. side: role, values (n, axes), unit in the file."""
     role, values, text = side
     columns: list[FloatArray] = []
     units: list[Unit] = []
@@ -194,7 +194,7 @@ def rate_of(arrays: Arrays) -> float | None:
 
 
 def _plain(name: str) -> str:
-    """A name of a rate or a period as they are listed: Sampling_Rate_Hz is samplingrate."""
+    """The spelling of a rate or a period in the lists above: samplingrate for Sampling_Rate_Hz."""
     return re.sub(r"[_ ](hz|sec)$|(?<=\w\w)[_ ]s$|[_ ]", "", name.lower())
 
 
@@ -230,7 +230,7 @@ def short(columns: list[Column]) -> list[Column]:
 
 
 def _label(arrays: Arrays, name: str) -> str:
-    """What a struct with a name and values calls them: the part of the name that tells something, time for one called X."""
+    """The label of a struct with a name and values: the informative part of its name, or time for a struct X."""
     place, _, last = name.rpartition(".")
     if last not in VALUES:
         return name
@@ -280,7 +280,7 @@ def _matrix(path: Path, name: str, values: NDArray[Any], rows: int | None) -> Fl
 
 
 def content(recording: Recording) -> dict[str, Any]:
-    """The arrays for .npz and .mat: enough to restore the recording."""
+    """The arrays for .npz and .mat, from which ``load`` restores the recording."""
     known = {
         "t": recording.time,
         "u": recording.voltage,
@@ -295,13 +295,13 @@ def content(recording: Recording) -> dict[str, Any]:
 
 
 def write_npz(path: Path, recording: Recording) -> None:
-    """Write exact, uncompressed numbers."""
+    """Write uncompressed numbers in full precision."""
     with path.open("wb") as file:
         np.savez(file, allow_pickle=False, **content(recording))
 
 
 def write_mat(path: Path, recording: Recording) -> None:
-    """MATLAB version 5."""
+    """Write a MATLAB version 5 file."""
     import scipy.io
 
     fields = content(recording)

@@ -20,14 +20,14 @@ from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.recording import Recording
 
 KINDS: tuple[StreamName, ...] = ("voltage", "position")
-WHOLE = 1 << 40  # samples; keeps blocks as they are
+WHOLE = 1 << 40  # samples; blocks are not divided
 MARGIN = 1.0  # s around the requested part, for late samples
 COPIES = 4  # memory for pairing, as a multiple of the samples' size
 SHARE = 0.6  # of the machine's memory that a recording may take
 
 
 def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | None) -> Recording:
-    """See ``xy_sysid.imports.load``."""
+    """The recording of a bag; see ``xy_sysid.imports.load``."""
     with Bag(path) as bag:
         source = chosen(bag, reading)
         kept, first = _collect(bag, pieces(bag, source, WHOLE, progress), reading.start, reading.stop)
@@ -42,7 +42,7 @@ def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | N
 
 
 def chosen(bag: Bag, reading: Reading) -> Source:
-    """What of a bag is read. Raises BadInput for what only a table has, BadRecording for a bag without it."""
+    """The topics of a bag to read. Raises BadInput for options of tables, BadRecording for a bag without these topics."""
     if reading.columns or reading.rate is not None:
         given = f"for {bag.path}"
         raise BadInput("--map or --rate", given, "for a table", "A bag has topics and stamps: choose topics with --topic, or leave it out.")
@@ -50,9 +50,9 @@ def chosen(bag: Bag, reading: Reading) -> Source:
 
 
 def together(bag: Bag, source: Source, kept: dict[StreamName, list[Block]], first: float, reading: Reading) -> Recording:
-    """The blocks of a part as a recording. first: the instant from which ``reading`` counts its start and stop.
+    """The blocks of a part as a recording. first: the instant, s, from which ``reading`` counts its start and stop.
 
-    What was odd is added to ``bag.notes``. Raises BadInput where no samples of the part are there.
+    Irregularities are added to ``bag.notes``. Raises BadInput if the part has no samples.
     """
     path, notes, start, stop = bag.path, bag.notes, reading.start, reading.stop
     if not all(sum(map(len, kept.get(kind, []))) for kind in KINDS):
@@ -85,7 +85,7 @@ def together(bag: Bag, source: Source, kept: dict[StreamName, list[Block]], firs
 def _collect(
     bag: Bag, blocks: Iterator[tuple[StreamName, Block]], start: float, stop: float | None
 ) -> tuple[dict[StreamName, list[Block]], dict[StreamName, float]]:
-    """The blocks that touch the part asked for, and the first instant of each kind; never more than fits in memory."""
+    """The blocks of the requested part, and the first instant of each kind. Raises BadRecording if they do not fit in memory."""
     kept: dict[StreamName, list[Block]] = {}
     first: dict[StreamName, float] = {}
     latest: dict[StreamName, float] = {}
@@ -158,7 +158,7 @@ def _axes(
 
 
 def _usual(blocks: Sequence[Block]) -> tuple[str, ...]:
-    """The columns of most samples: a single wrong message does not decide, even if it is the first."""
+    """The columns of most samples, so that single wrong messages do not matter."""
     counts: dict[tuple[str, ...], int] = {}
     for block in blocks:
         counts[block.axes] = counts.get(block.axes, 0) + len(block)
@@ -166,7 +166,7 @@ def _usual(blocks: Sequence[Block]) -> tuple[str, ...]:
 
 
 def _with_numbers(bag: Bag, blocks: dict[StreamName, list[Block]], axes: tuple[str, ...], notes: list[str]) -> tuple[str, ...]:
-    """The axes without those that have hardly any numbers, if others have them."""
+    """The axes without those that have hardly any numbers, unless all are such."""
     empty: set[str] = set()
     for kind in ("voltage", "position"):
         values = [block.values for block in blocks[kind]]
@@ -191,7 +191,7 @@ def _by_stamp(stream: Stream, by: Stream) -> Stream:
 
 
 def topics(reading: Reading) -> Topics:
-    """What of a bag is to be read."""
+    """The topics to read, from the options."""
     return Topics(
         voltage_topic=reading.voltage_topic,
         position_topic=reading.position_topic,
@@ -204,9 +204,9 @@ def topics(reading: Reading) -> Topics:
 
 
 def _in_order(path: Path, streams: dict[str, Stream], lag: int, notes: list[str]) -> dict[str, Stream]:
-    """Positions and efforts of one stream of joint states, placed by their stamps where its period drifts, as in a table of uneven time.
+    """Positions and efforts of one stream of joint states, resampled by their stamps if the period drifts, as in a table of uneven time.
 
-    Stamps that jitter too much to count by, but of which none is lost, are numbered as they came. lag: samples by which efforts are older
+    If stamps only jitter too much to be counted, samples are numbered as they came. Empty if neither applies. lag: samples by which efforts are older
     """
     position, voltage = streams["position"], streams["voltage"]
     time, both = position.time, len(voltage.seq)

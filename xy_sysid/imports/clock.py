@@ -1,4 +1,4 @@
-"""Time compared with the sample counter: differences are reported, so that nothing is paired wrongly without a note."""
+"""Time compared with the sample counter: differences are reported in notes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from xy_sysid.samples.block import FloatArray
 
 OFF = 0.4  # of a period; less is jitter of the stamps
 BEFORE = 8  # samples before and after a step, over which it must persist
-SAID = 3  # places named in one sentence
+SAID = 3  # most places named in one sentence
 
 
 def disagreements(name: str, seq: FloatArray, time: FloatArray, rate: float) -> list[str]:
-    """Sentences on where the time jumps and where the counter slips, with the place."""
+    """Sentences on the places where the time jumps or the counter slips."""
     jumps, slips = steps(seq, time, rate)
     said = []
     if jumps:
@@ -31,7 +31,7 @@ def _times(found: list[tuple[int, float]]) -> str:
 
 
 def steps(seq: FloatArray, time: FloatArray, rate: float) -> tuple[list[tuple[int, float]], list[tuple[int, float]]]:
-    """(row, size) of lasting steps: of time in s where the counter goes on, of the counter in samples where the time goes on."""
+    """(row, size) of lasting steps: of the time, s, while the counter continues, and of the counter, samples, while the time continues."""
     if len(seq) < 2 * BEFORE or rate <= 0:
         return [], []
     ahead = (time - time[0]) * rate - (seq - seq[0])  # periods by which time is ahead of the counter

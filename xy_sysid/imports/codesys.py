@@ -1,4 +1,4 @@
-"""Trace of CODESYS, ctrlX and other controls built on it (.trace.csv): ``key; value`` rows, and the samples of each variable below its ``Data``.
+"""Trace of CODESYS, ctrlX and other controls based on it (.trace.csv): ``key; value`` rows, and the samples of each variable below its ``Data``.
 
 Times are in ms from the start of the trace. Source: files of AragakiCH/ctrlx_sysid.
 """

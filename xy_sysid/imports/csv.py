@@ -1,7 +1,7 @@
 """CSV --> columns, and a recording --> CSV.
 
-The first row names the columns, with the unit in brackets where it is not SI: ``x_position[mm]`` or ``x_position (mm)``.
-Columns are separated by comma, semicolon, tab or blanks; but for the first the decimal sign may be a comma (``imports.text_table``).
+The first row names the columns, with the unit in brackets if it is not SI: ``x_position[mm]`` or ``x_position (mm)``.
+Columns are separated by comma, semicolon, tab or blanks; the decimal sign may be a comma unless commas separate (``imports.text_table``).
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, rate_from_time
 
 EXAMPLE = "Name the columns like time,x_voltage,x_position[mm] in the first row."
-HEADS = 10  # lines whose cells are counted before anything is made of them
+HEADS = 10  # lines whose cells are counted before the file is parsed
 PIECE = 1 << 24  # bytes read at once
 LONGEST_LINE = 10_000_000  # bytes; a thousand for each of MOST_COLUMNS
-LOOK = 200  # rows before the last one that show how its numbers are written
+LOOK = 200  # rows before the last one that show the usual length of its last number
 
 
 def sheet(path: Path) -> Sheet:
-    """The columns of a file; what is not a number is told when its column is used."""
+    """The columns of a file; a cell that is not a number is reported when its column is used."""
     text = text_of(path)
     notes: list[str] = []
     widest = max(line.count(sign) for line in text.split("\n", HEADS)[:HEADS] for sign in SEPARATORS)
@@ -44,7 +44,7 @@ def sheet(path: Path) -> Sheet:
 
 
 def text_of(path: Path) -> str:
-    """The file's text: UTF-8, UTF-16 if it begins so, or else as Windows writes it."""
+    """The file's text: UTF-16 if it has its mark, otherwise UTF-8 or the Windows code page 1252."""
     raw = _raw(path)
     for code in ("utf-16",) if raw.startswith((b"\xff\xfe", b"\xfe\xff")) else ("utf-8-sig", "cp1252"):
         try:
@@ -57,7 +57,7 @@ def text_of(path: Path) -> str:
 
 
 def _raw(path: Path) -> bytes:
-    """The file's bytes; raises BadRecording, before the rest is read, for a line that no table has."""
+    """The file's bytes. Raises BadRecording, before it reads the rest, for a line longer than any table has."""
     parts: list[bytes] = []
     open_line = 0  # bytes since the last end of a line
     with path.open("rb") as file:
@@ -74,7 +74,7 @@ def _raw(path: Path) -> bytes:
 
 
 def _without_words(rows: Rows, separator: str, notes: list[str]) -> Rows:
-    """The rows without the last ones that begin with a word where the first begins with a number: means, or the end of the file."""
+    """The rows without last ones that begin with a word, such as means, if the first row begins with a number."""
 
     def begins(row: tuple[int, str]) -> str:
         return cells_of(row[1], separator)[0]
@@ -89,7 +89,7 @@ def _without_words(rows: Rows, separator: str, notes: list[str]) -> Rows:
 
 
 def _whole(rows: Rows, separator: str, width: int, notes: list[str]) -> Rows:
-    """The rows without the last, if the file ends inside it: too few cells, or a number shorter than the others are written."""
+    """The rows without the last one if the file ends inside it: it has too few cells, or a shorter number than the others."""
     if not rows:
         return rows
     number, line = rows[-1]
@@ -105,17 +105,17 @@ def _whole(rows: Rows, separator: str, width: int, notes: list[str]) -> Rows:
 
 
 def table_of(path: Path, names: Names, lines: list[str], first: int) -> tuple[Column, ...]:
-    """The columns of rows of numbers separated by commas. first: number in the file of the first row."""
+    """The columns of rows of numbers separated by commas. first: row number of the first in the file."""
     return _columns(path, [(number, line) for number, line in enumerate(lines, first) if line.strip()], ",", names)[0]
 
 
 def _digits(cell: str) -> int:
-    """Signs after the decimal sign."""
+    """Number of digits after the decimal sign."""
     return len(cell) - 1 - max(cell.find("."), cell.find(",")) if "." in cell or "," in cell else 0
 
 
 def _columns(path: Path, rows: Rows, separator: str, names: Names) -> tuple[tuple[Column, ...], dict[str, str]]:
-    """The columns, and what is wrong with those that hold something else than numbers."""
+    """The columns, and for each that holds something else than numbers the first such cell."""
     width = len(names)
     table = _quick(rows, separator, width)
     if table is not None:
@@ -157,7 +157,7 @@ def _quick(rows: Rows, separator: str, width: int) -> FloatArray | None:
 
 
 def write(path: Path, recording: Recording) -> None:
-    """Every number exactly (17 digits); ``seq`` is written where the times alone would not give it back."""
+    """Write every number in full precision; ``seq`` is written only if it does not follow from the times."""
     names, columns = ["time"], [recording.time]
     steps = np.rint((recording.time - recording.time[0]) * rate_from_time(recording.time)) if len(recording) > 1 else np.zeros(len(recording))
     if not np.array_equal(recording.seq, steps):

@@ -1,6 +1,6 @@
-"""Rows that ``ros2 topic echo --csv`` prints of joint states: a stamp, a frame, the joints' names and their numbers, and no row of names.
+"""Rows that ``ros2 topic echo --csv`` prints of joint states: a stamp, a frame, the joints' names and their numbers, without a header.
 
-As ``rosidl_runtime_py.convert.message_to_csv`` writes them: the fields in their order, an empty cell for an empty array.
+Source: ``rosidl_runtime_py.convert.message_to_csv``, which writes the fields in order, and an empty cell for an empty array.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import numpy as np
 from xy_sysid.imports.sheet import Column
 
 BEFORE = ("sec", "nanosec", "frame_id")
-ORDER = ("position", "velocity", "effort")  # as sensor_msgs/JointState has them; each may be empty
+ORDER = ("position", "velocity", "effort")  # as in sensor_msgs/JointState; each may be empty
 
 
 def joint_states(cells: list[str]) -> list[str] | None:
-    """Names of the columns, by the cells of the first row; None if it is no joint state."""
+    """Names of the columns, from the cells of the first row; None if it is no joint state."""
     if len(cells) < 5 or not (cells[0].isdigit() and cells[1].isdigit() and int(cells[1]) < 10**9):
         return None
     rest = cells[len(BEFORE) :]
@@ -36,7 +36,7 @@ def joint_states(cells: list[str]) -> list[str] | None:
 
 
 def stamped(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Both parts of the stamp as one time, s from the first row on."""
+    """The columns with both parts of the stamp as one time, s since the second of the first row."""
     seconds, parts, *rest = columns
     since = seconds.values - (seconds.values[0] if seconds.values.size else 0.0)
     return Column("time", "s", np.asarray(since + 1e-9 * parts.values)), *rest

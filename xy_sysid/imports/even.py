@@ -1,9 +1,8 @@
-"""From uneven time to even samples: jittering stamps are counted; truly uneven time is resampled, or refused.
+"""From uneven time to even samples: samples with jittering stamps are counted; samples at uneven instants are resampled, or refused.
 
-Jitter of the stamps alone leaves them within a period of a straight line, now before it and now after; the samples
-themselves are even and stay as they are. Where the instants wander off the line the samples are uneven: the input, which is
-held from sample to sample, becomes its mean over each even step (so that no drive is lost or doubled), and the output is
-interpolated (cubic), both only where no more than ``GAP`` periods lie between two samples.
+If only the stamps jitter, they stay within a period of a straight line on both sides; the samples are even and stay unchanged.
+If the instants drift from the line, the samples are uneven: the input, which is held from sample to sample, is averaged over each
+even step (so that no drive is lost or doubled), and the output is interpolated (cubic), but not over more than ``GAP`` periods.
 """
 
 from __future__ import annotations
@@ -19,23 +18,23 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import rate_from_time
 
 GAP = 2.5  # periods; over a longer step nothing is interpolated
-BRIDGED = 10.0  # periods; used instead of GAP if steps jitter so much that hardly LOCAL of them come without a gap
+BRIDGED = 10.0  # periods; used instead of GAP if steps jitter so much that fewer than LOCAL come without a gap
 LOCAL = 50  # samples over which the period is evaluated
-STEADY = 0.005  # relative; a period that varies less counts as even: frequencies are wrong by no more
-BURST = 0.2  # of a period; more steps than BURSTS shorter than that are stamps that came in bursts
+STEADY = 0.005  # relative; a period that varies less counts as even: the error of frequencies is no larger
+BURST = 0.2  # of a period; if more than BURSTS of the steps are shorter, the stamps came in bursts
 BURSTS = 0.2
 STRETCH, APART = (
     200,
     50,
 )  # samples over which a period is distinguished from late, lost and jittering stamps; distance of two samples that are compared
 DRIFT = 0.02  # relative; a period that changes by more within a recording is not constant
-LOST = 0.3  # of the time; where steps jitter, more than that in steps longer than GAP is lost
+LOST = 0.3  # of the time; jittering steps longer than GAP may cover no more
 Values = tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Even:
-    """seq (n,), time (n,) s, rate Hz; values: as given, or resampled."""
+    """seq: (n,) sample numbers; time: (n,) s; rate: Hz; values: given or resampled."""
 
     seq: FloatArray
     time: FloatArray
@@ -93,7 +92,7 @@ def drifts(time: FloatArray) -> bool:
 
 
 def _varies(time: FloatArray, count: FloatArray) -> bool:
-    """True if the period by this count, a median of many over a stretch, differs between stretches."""
+    """True if the period by this count, a median over a stretch, differs between stretches."""
     passed, counted = time[APART:] - time[:-APART], count[APART:] - count[:-APART]
     periods, rows = passed / np.maximum(counted, 1.0), STRETCH - APART
     local = [np.median(periods[begin : begin + rows]) for begin in range(0, len(periods) - rows + 1, STRETCH // 2)]
@@ -140,7 +139,7 @@ def _resampled(path: Path, time: FloatArray, rate: float, held: FloatArray, smoo
 
 
 def _scattered(steps: FloatArray) -> bool:
-    """Whether long steps lie among the others, as of a clock that jitters, rather than between stretches. steps: in periods."""
+    """Whether long steps are spread among the others, as with a jittering clock, instead of separating stretches. steps: in periods."""
     edges = np.concatenate(([0], np.flatnonzero(steps > GAP) + 1, [len(steps) + 1]))
     sizes = np.diff(edges)
     return float(np.median(np.repeat(sizes, sizes))) < LOCAL

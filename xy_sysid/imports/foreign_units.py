@@ -19,7 +19,7 @@ MOTIONS: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """name: in SI, or as it was written if it is not known; scale: SI = number * scale; guessed: by another spelling (MM for mm)."""
+    """name: in SI, or as written if unknown; scale: SI = number * scale; guessed: from another spelling (MM for mm)."""
 
     name: str
     scale: float
@@ -87,7 +87,7 @@ def unit_of(text: str) -> Unit:
 
 
 def to_si(values: FloatArray, text: str, what: str, notes: list[str]) -> tuple[FloatArray, Unit]:
-    """Values in SI and their unit; a note says what was converted, guessed, or not known."""
+    """Values in SI and their unit; a note reports a conversion, a guess or an unknown unit."""
     unit = unit_of(text)
     if unit.quantity == "unknown":
         notes.append(f"the unit {text!r} of {what} is not known; it is kept as it is (give another with --unit, or a factor with --scale)")

@@ -1,4 +1,4 @@
-"""Units and factors that the user gives for a recording that names none of its own: the topics of a bag."""
+"""Units and factors that the user gives for the topics of a bag, which name none."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from xy_sysid.units import Sensed
 
 
 def in_units(recording: Recording, reading: Reading) -> Recording:
-    """The recording in SI by the units and factors that were given, or that the bag names."""
+    """The recording in SI, by the given units and factors, or those of the bag. Raises BadInput if axes get different units."""
     notes = list(recording.notes)
     u, input_unit = _side(recording, "input", recording.voltage, recording.input_unit, reading, notes)
     y, output_unit = _side(recording, "output", recording.position, recording.output_unit, reading, notes)
@@ -28,7 +28,7 @@ def in_units(recording: Recording, reading: Reading) -> Recording:
 
 
 def _meant(text: str, measured: Sensed) -> str:
-    """The unit that is meant: of a velocity that of its position may be said, rad for rad/s."""
+    """The intended unit: for a velocity the unit of its position may be given, rad for rad/s."""
     return f"{text}/s" if measured == "velocity" and unit_of(text).quantity == "position" else text
 
 

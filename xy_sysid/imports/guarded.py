@@ -1,4 +1,4 @@
-"""Files that a library of others reads --> leaves: every number and word by its name, read in a process that may crash."""
+"""Files that an external library reads --> leaves: numbers and words by name, read in a separate process, since the library may crash."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LONGEST = 120.0  # s for any file that fits in memory
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """Numbers, or words as an array of text. clock: name of the leaf with their instants in s, "" if they have none of their own."""
+    """Numbers, or words as an array of text. clock: name of the leaf with their instants, s; "" if there is none."""
 
     name: str
     values: NDArray[Any]
@@ -32,7 +32,7 @@ class Leaf:
 
 
 def leaves(path: Path, reader: str, extra: str = "") -> list[Leaf]:
-    """All that a reader of ``libraries`` finds in a file. extra: of the package, that installs its library. Raises BadRecording, MissingExtra."""
+    """The leaves that a reader of ``libraries`` finds in a file. extra: of this package, installs the library. Raises BadRecording, MissingExtra."""
     # -P: the folder of the child does not hide Python's own modules
     command = [sys.executable, "-P", str(CHILD), str(LIBRARIES / f"{reader}.py"), str(path.absolute()), str(int(room()))]
     try:
@@ -41,7 +41,7 @@ def leaves(path: Path, reader: str, extra: str = "") -> list[Leaf]:
         raise BadRecording(path, f"not read as {path.suffix} within {LONGEST:.0f} s", COPY) from None
     line, _, data = done.stdout.partition(b"\n")
     why = (done.stderr.decode("utf-8", "replace").strip().splitlines() or [""])[-1]
-    if done.returncode == 1 and why:  # what the library raised
+    if done.returncode == 1 and why:  # the library raised an error
         raise BadRecording(path, f"not readable as {path.suffix} ({why[:120]})", COPY)
     if done.returncode != 0 or not line:
         how = f"signal {-done.returncode}" if done.returncode < 0 else f"exit code {done.returncode}"

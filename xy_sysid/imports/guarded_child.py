@@ -1,7 +1,7 @@
-"""Reads one file with a library of others in a process of its own, since a library can crash the process it runs in, or fill its memory.
+"""Reads one file with an external library in a separate process, since a library can crash its process or fill its memory.
 
-Run as ``python -P guarded_child.py READER FILE BYTES``: READER is a file of ``libraries/``. Limits its own memory, and writes one line of JSON and
-then the numbers to stdout. It imports nothing of the package, so that it starts quickly.
+Run as ``python -P guarded_child.py READER FILE BYTES``: READER is a file of ``libraries/``. The process limits its memory, and writes one line of
+JSON and then the numbers to stdout. It imports nothing of this package, so it starts quickly.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ MOST = 20_000  # leaves
 
 
 def main(reader: str, path: str, most: int) -> None:
-    """Answer on stdout: {"leaves": [...]}, {"size": bytes} of a file that is too large, or {"missing": module}.
+    """Answer on stdout: {"leaves": [...]}, {"size": bytes} for a file that is too large, or {"missing": module}.
 
-    Whatever else a library raises ends this process with exit code 1 and the reason in the last line of stderr.
+    Any other error of a library ends this process with exit code 1 and the reason in the last line of stderr.
     """
     import numpy as np
 
@@ -64,7 +64,7 @@ def _loaded(reader: str) -> ModuleType:
 
 
 def answer(document: dict[str, Any]) -> None:
-    """The first line."""
+    """Write the first line of the answer."""
     sys.stdout.buffer.write(json.dumps(document).encode() + b"\n")
     sys.stdout.buffer.flush()
 

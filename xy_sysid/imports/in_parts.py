@@ -1,4 +1,4 @@
-"""A long recording -> its parts of equal length, one after another: each sample is read once, and of a bag a few parts are in memory at a time."""
+"""A long recording in parts of equal length: each sample is read once, and only a few parts of a bag are in memory at a time."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ SHORTEST = MARGIN  # s, least length of a part
 
 
 def in_parts(path: Path, reading: Reading, every: float) -> Iterator[tuple[int, Recording]]:
-    """Number and samples of each part in which something is; the first begins at ``reading.start``, the last one ends at ``reading.stop``.
+    """Number and samples of each part that has samples; the first begins at ``reading.start``, the last ends at ``reading.stop``.
 
-    every: s of a part, ``SHORTEST`` at least. Where the source of a bag starts again a part begins.
+    every: duration of a part, s, ``SHORTEST`` at least. A new part begins where the source of a bag restarts.
     Raises BadRecording or BadInput as ``imports.load``.
     """
     found = False
@@ -41,7 +41,7 @@ def in_parts(path: Path, reading: Reading, every: float) -> Iterator[tuple[int, 
         except OSError as error:
             raise BadRecording(path, f"cannot be read ({error.strerror or error})", "Check the path and the permissions.") from None
     if not found:
-        yield 0, load(path, reading)  # or the reason why not
+        yield 0, load(path, reading)  # or its error
 
 
 def _span(reading: Reading, every: float, number: int) -> Reading:
@@ -65,12 +65,12 @@ def _of_table(path: Path, reading: Reading, every: float) -> Iterator[tuple[int,
 
 
 def _numbers(elapsed: FloatArray, every: float, margin: float) -> list[int]:
-    """The parts that contain some instants, s, or are within a margin of them."""
+    """The numbers of the parts that contain the instants, s, or are within a margin of them."""
     return [int(number) for number in np.unique(np.floor(np.concatenate([elapsed - margin, elapsed, elapsed + margin]) / every))]
 
 
 def _counted(blocks: Iterator[tuple[StreamName, Block]]) -> Iterator[tuple[StreamName, int, Block, FloatArray]]:
-    """Each block with how often its stream had restarted, and the instants that it knows. A single block that comes late is no start."""
+    """Each block with the number of restarts of its stream before it, and its finite instants. A single late block is no restart."""
     starts: dict[StreamName, int] = {}
     latest: dict[StreamName, float] = {}
     odd: dict[StreamName, tuple[Block, FloatArray]] = {}
@@ -95,10 +95,10 @@ def _counted(blocks: Iterator[tuple[StreamName, Block]]) -> Iterator[tuple[Strea
 def _of_bag(path: Path, reading: Reading, every: float) -> Iterator[tuple[int, Recording]]:
     waiting: dict[int, dict[StreamName, list[Block]]] = {}
     sizes: dict[int, int] = {}  # bytes of each of them
-    begins = [0]  # the part with which each start of the source begins
-    origins: dict[tuple[StreamName, int], float] = {}  # the instant of each start from which its parts count
-    reached: dict[StreamName, int] = {}  # part before which nothing comes any more
-    done = 0  # part before which all are given
+    begins = [0]  # number of the first part after each start of the source
+    origins: dict[tuple[StreamName, int], float] = {}  # the instant of each start from which its parts count, s
+    reached: dict[StreamName, int] = {}  # number of the part that the stream has reached
+    done = 0  # all parts before this number were yielded
     with Bag(path) as bag:
         source = chosen(bag, reading)
 
@@ -129,7 +129,7 @@ def _of_bag(path: Path, reading: Reading, every: float) -> Iterator[tuple[int, R
             if min(ends) > _last(reading, every):
                 break
             for number in sorted(waiting):
-                if number < min(ends) or number < max(ends) - 1:  # both are beyond it, or one by a whole part
+                if number < min(ends) or number < max(ends) - 1:  # both streams are beyond it, or one by a whole part
                     done = number + 1
                     yield from made(number)
         for number in sorted(waiting):

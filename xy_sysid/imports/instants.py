@@ -1,4 +1,4 @@
-"""A column that holds instants --> seconds: numbers in a unit or since 1970, dates, times of the day, and times with their unit."""
+"""A column of instants --> seconds: numbers in a unit or since 1970, dates, times of the day, and times with their unit."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ CLOCK = re.compile(
     r"(?P<day>.*?[^\d:])??(?:(?P<hours>\d+):)?(?P<minutes>\d+):(?P<seconds>[0-5]?\d(?:[.,]\d+)?)(?::(?P<millis>\d{1,3}))?\s*(?P<half>[AaPp][Mm])?"
 )
 WITH_UNIT = re.compile(r"(?P<number>[-+]?[\d.,]+(?:[eE][-+]?\d+)?)\s*(?P<unit>[A-Za-zµμ]+)")
-FROM, UNTIL = 978307200.0, 4133980800.0  # s since 1970 of the years 2001 to 2100: a clock that reads such a time counts from then
-EXACT = 1e17  # numbers that are larger are instants of ns, which a double of seconds since 1970 does not hold
+FROM, UNTIL = 978307200.0, 4133980800.0  # s since 1970, of the years 2001 to 2100: a clock with such a time counts from 1970
+EXACT = 1e17  # larger numbers are ns since 1970, which a double of seconds cannot represent
 BEGIN = datetime(1970, 1, 1, tzinfo=UTC)
 DAY = 86400.0
 ACT = "Give seconds, times like 12:00:00.001, or dates like 2026-03-01T12:00:00.001."
@@ -30,7 +30,7 @@ ACT = "Give seconds, times like 12:00:00.001, or dates like 2026-03-01T12:00:00.
 
 @dataclass(frozen=True, slots=True)
 class Stamps:
-    """Instants as they were written: values (n,) in a unit of ``scale`` s; far: they count from so long ago that doubles of seconds lose them."""
+    """Instants as written: values (n,) in a unit of ``scale`` s; far: they count from so long ago that doubles of seconds are too coarse."""
 
     values: FloatArray
     scale: float
@@ -42,12 +42,12 @@ class Stamps:
         return np.asarray((self.values - (first[0] if first.size else 0.0) * (other.scale / self.scale)) * self.scale)
 
     def seconds(self) -> FloatArray:
-        """(n,) s, from the first on if they count from long ago."""
+        """(n,) s, counted from the first if ``far``."""
         return self.after(self) if self.far else self.values * self.scale
 
 
 def stamps(path: Path, column: Column, reading: Reading, notes: list[str]) -> Stamps:
-    """The instants of a column, by the unit that was given, its own, that of its name, or its size. Raises BadRecording for what is no time."""
+    """The instants of a column, by the given unit, its own, that of its name, or its size. Raises BadRecording if it holds no times."""
     if column.words:
         values, unit = _of_words(path, column)
         return Stamps(values, unit_of(unit).scale, far=True)
@@ -65,7 +65,7 @@ def stamps(path: Path, column: Column, reading: Reading, notes: list[str]) -> St
 
 
 def _of_words(path: Path, column: Column) -> tuple[FloatArray, str]:
-    """Numbers (n,) and their unit; raises BadRecording that says which word is none."""
+    """Numbers (n,) and their unit; raises BadRecording that names the first word that is no time."""
     for way, unit in WAYS:
         try:
             return way(column.words), unit
@@ -76,7 +76,7 @@ def _of_words(path: Path, column: Column) -> tuple[FloatArray, str]:
 
 
 def _told(text: str) -> bool:
-    """By the first of the ways that it can be."""
+    """Whether a text is a time in one of the known forms."""
     for way, _ in WAYS:
         try:
             way([text])
@@ -87,14 +87,14 @@ def _told(text: str) -> bool:
 
 
 def _dates(words: Sequence[str]) -> FloatArray:
-    """Microseconds since 1970, which a double holds exactly."""
+    """Microseconds since 1970, which a double represents exactly."""
     found = [datetime.fromisoformat(text) for text in words]
     aware = [one if one.tzinfo else one.replace(tzinfo=UTC) for one in found]
     return np.array([(one - BEGIN) // timedelta(microseconds=1) for one in aware], np.float64)
 
 
 def _clock(words: Sequence[str]) -> FloatArray:
-    """Seconds since midnight, of hours, minutes and seconds after a date: another date, or a clock that goes back by half a day, is the next day."""
+    """Seconds since the first midnight, from hours, minutes and seconds. A new date, or a clock that goes back by half a day, starts the next day."""
     found = np.empty(len(words))
     days, before = 0, ""
     for k, text in enumerate(words):
@@ -114,7 +114,7 @@ def _clock(words: Sequence[str]) -> FloatArray:
 
 
 def _with_units(words: Sequence[str]) -> FloatArray:
-    """0.002 sec, 2 ms."""
+    """Seconds from texts like 0.002 sec or 2 ms."""
     found = []
     for text in words:
         parts = WITH_UNIT.fullmatch(text.strip())

@@ -1,4 +1,4 @@
-"""JSON --> columns: every array of numbers by its path. ``data[*].actions`` is the arrays of all items of ``data``, one stretch after the other."""
+"""JSON --> columns: every array of numbers by its path. ``data[*].actions`` joins the arrays of all items of ``data``, a stretch for each item."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sysid.imports.arrays import rate_of
 from xy_sysid.imports.limits import COPY, MOST_COLUMNS, fits
 from xy_sysid.imports.sheet import Column, Sheet
 
-COPIES = 8  # bytes in memory for one in the file
+COPIES = 8  # bytes in memory for each byte of the file
 DEEPEST = 24  # levels
 FEW = 32  # numbers of one vector, such as the joints of an arm
 
@@ -43,7 +43,7 @@ def sheet(path: Path) -> Sheet:
 
 
 def _columns(path: str, value: Any, depth: int) -> Iterator[tuple[str, Any, tuple[int, ...]]]:
-    """Path, numbers and first rows of the stretches of each array."""
+    """Path, numbers and first row of each stretch, for every array."""
     if depth > DEEPEST:
         return
     if isinstance(value, dict):
@@ -64,7 +64,7 @@ def _columns(path: str, value: Any, depth: int) -> Iterator[tuple[str, Any, tupl
 
 
 def _together(path: str, items: list[Any], depth: int) -> Iterator[tuple[str, Any, tuple[int, ...]]]:
-    """What the items of one list hold under one name: a number of each, or an array of each, or more below."""
+    """The columns of one name in all items of a list: from a number in each, an array in each, or deeper levels."""
     if all(map(_is_number, items)):
         if len(items) > 1 and any(one is not None for one in items):
             yield path, np.array([np.nan if one is None else one for one in items], np.float64), ()

@@ -1,4 +1,4 @@
-"""Named arrays of a file of others --> its columns: matrices by column, structs by their labels, and channels with times of their own."""
+"""Named arrays of a foreign file --> its columns: matrices by column, structs by their labels, and channels with their own times."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from xy_sysid.imports.sheet import Column, Sheet
 
 
 def sheet_of_leaves(path: Path, found: Sequence[Leaf]) -> Sheet:
-    """Channels with clocks are columns with the instants of these; everything else is read as arrays are."""
+    """The columns: channels with clocks get the instants of these; leaves without any clock are read as arrays."""
     clocks = {leaf.clock for leaf in found if leaf.clock}
     if not clocks:
         return arrays.sheet_of(path, arrays.group(path, {leaf.name: leaf.values for leaf in found}))

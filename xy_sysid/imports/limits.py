@@ -1,4 +1,4 @@
-"""Limits of the size of files: nothing is unpacked before its size is known to fit."""
+"""Limits of the size of files: a file is unpacked only if its size fits in memory."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from pathlib import Path
 
 from xy_sysid.errors import BadRecording
 
-COPY = "Take another copy of the file."  # what to do about a file that is damaged
+COPY = "Take another copy of the file."  # advice for a damaged file
 SHARE = 0.6  # of the machine's memory that a recording may take
 MOST_COLUMNS = 10_000  # of a table, or arrays of a file; no recording has more signals
-COPIES = 4  # times its size that reading and pairing need while they work
+COPIES = 4  # memory for reading and pairing, as a multiple of the size
 
 
 def room() -> float:
@@ -19,7 +19,7 @@ def room() -> float:
 
 
 def fits(path: Path, size: float, what: str = "unpacked") -> None:
-    """Raises BadRecording for more bytes than there is room for."""
+    """Raises BadRecording if this many bytes do not fit in memory."""
     if size > room():
         problem = f"{what} it would take {size / 1e9:.3g} GB, and {room() / 1e9:.2g} GB may be loaded at once"
         raise BadRecording(path, problem, "Store a shorter part, or as a rosbag2 and give a part with --span.")

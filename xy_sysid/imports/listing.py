@@ -37,7 +37,7 @@ class Listed:
 
 @dataclass(frozen=True, slots=True)
 class Listing:
-    """kind: of ``registry.FORMATS``, or bag; reads: how it reads without options, or why not; notes: of that reading."""
+    """kind: of ``registry.FORMATS``, or bag; reads: the recording without options; problem: why there is none; notes: of that reading."""
 
     kind: str
     columns: tuple[Listed, ...]
@@ -47,7 +47,7 @@ class Listing:
 
 
 def listing(path: Path) -> Listing:
-    """Raises BadRecording for what cannot be opened at all."""
+    """The content of a file. Raises BadRecording if it cannot be opened at all."""
     form = format_of(path)
     kind = form.kind
     if form is BAG:
@@ -134,7 +134,7 @@ def _looks(column: Column, finite: FloatArray) -> str:
 
 
 def _topics(path: Path) -> tuple[Listed, ...]:
-    """One row per topic, with the names of its columns or joints."""
+    """A row for each topic, with the names of its columns or joints."""
     with Bag(path) as bag:
         names = [topic.name for topic in bag.topics]
         inside: dict[str, str] = {}

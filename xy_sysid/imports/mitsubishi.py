@@ -1,6 +1,6 @@
 """Mitsubishi MR Configurator graph (.csv): two header rows, the second of units and signals; torque in % of the rated one, speed in r/min.
 
-Signals are called as MR Configurator2 calls them. Digital ones show a level in V on the screen; they are states, and are named so.
+Signals have the names of MR Configurator2. Digital ones have a level in V on the screen; they are states, so "state" is added to their names.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from xy_sysid.imports import csv
 from xy_sysid.imports.csv import text_of
 from xy_sysid.imports.sheet import Column, Sheet
 
-UNITS = {"speed": "rpm", "torque": "%", "current": "%", "pulses": "counts", "position": "counts"}  # by a word of a signal's name
+UNITS = {"speed": "rpm", "torque": "%", "current": "%", "pulses": "counts", "position": "counts"}  # by a word in the signal's name
 NONE = "Not selected"
-BY = re.compile(r"\(by (\d{1,6}) pls")  # pulses are counted by the hundred, too
+BY = re.compile(r"\(by (\d{1,6}) pls")  # pulses may be counted in hundreds
 
 
 def sheet(path: Path) -> Sheet:
-    """The signals that were selected, and the time."""
+    """The time and the selected signals."""
     lines = text_of(path).splitlines()
     place = next((at for at, line in enumerate(lines) if line.startswith("Time,")), None)
     if place is None or place + 1 >= len(lines):

@@ -1,4 +1,4 @@
-"""Angles that wrap; and velocity or acceleration --> position, by the law of ``samples.integral``, so that all works on positions."""
+"""Angles that wrap; and velocity or acceleration --> position, by the law of ``samples.integral``."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.integral import detrended, integral
 from xy_sysid.samples.recording import Recording
 
-TURN, NEARLY = 2 * np.pi, 0.5  # rad; a step that is a turn within so much, where others are smaller than that, is an angle that wraps
+TURN, NEARLY = 2 * np.pi, 0.5  # rad; an angle wraps if a step is a turn within NEARLY, and usual steps are smaller
 FEWEST = 8  # bits of the shortest counter that is distinguished from small steps
 LOOK = 200_000  # samples from which the usual step is taken
 
 
 def wraps(values: FloatArray, turn: float = TURN) -> int:
-    """How often values (n,) leap by a whole turn from one sample to the next, as an angle (rad) that is kept within a turn."""
+    """How often values (n,) jump by a whole turn from one sample to the next, as an angle (rad) that is kept within a turn."""
     steps, nearly = np.abs(np.diff(values)), NEARLY * turn / TURN
     usual = float(np.quantile(steps[:LOOK], 0.9)) if steps.size else 0.0
     return int(np.sum(np.abs(steps - turn) < nearly)) if usual < nearly else 0
 
 
 def unwrapped(reference: FloatArray, position: FloatArray) -> FloatArray:
-    """A reference (n,), rad, that goes on where it leaps by a turn, beginning within half a turn of the position (n,); as it is if it never leaps."""
+    """A reference (n,), rad, unwrapped, and starting within half a turn of the position (n,); unchanged if it never jumps by a turn."""
     if not wraps(reference):
         return reference
     whole = np.unwrap(reference)
@@ -32,7 +32,7 @@ def unwrapped(reference: FloatArray, position: FloatArray) -> FloatArray:
 
 
 def leaps(values: FloatArray, unit: str) -> str:
-    """What values (n,) that are no angle look like which wraps: a counter of 2^k counts, or degrees that are taken as m. Nothing otherwise."""
+    """A note if values (n,) in m or counts wrap like a counter of 2^k counts, or like degrees that are taken as m; empty otherwise."""
     largest = float(np.max(np.abs(np.diff(values)), initial=0.0))
     turn = 2.0 ** np.rint(np.log2(largest)) if unit == COUNTS and largest > 0 else 360.0 if unit == "m" else 0.0
     count = wraps(values, turn) if turn >= 2**FEWEST and np.ptp(values) <= turn else 0  # a counter that wraps never leaves its range
@@ -43,7 +43,7 @@ def leaps(values: FloatArray, unit: str) -> str:
 
 
 def as_position(recording: Recording) -> Recording:
-    """The same recording with the integral of what was measured as its position; as it is if that was a position."""
+    """The recording with the integral of the measured velocity or acceleration as position; unchanged if a position was measured."""
     if recording.measured == "position":
         return recording
     unit = recording.output_unit
@@ -77,7 +77,7 @@ def _integral(recording: Recording, values: FloatArray) -> FloatArray:
 
 
 def _without_line(recording: Recording, values: FloatArray) -> FloatArray:
-    """Each run less its straight line."""
+    """Each run minus its straight line."""
     values = values.copy()
     for run in recording.runs():
         values[run] = np.column_stack([detrended(column) for column in values[run].T])

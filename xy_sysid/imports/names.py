@@ -1,6 +1,6 @@
-"""What a column's name says: ``Motor Voltage (V)`` is an input, ``time_ms`` the time, ``u_x`` the input of the axis x.
+"""The meaning of a column's name: ``Motor Voltage (V)`` is an input, ``time_ms`` the time, ``u_x`` the input of the axis x.
 
-Only the words in the tables below are known; whoever calls things otherwise says so with ``--map``.
+Only the words in the tables below are known; for other names use ``--map``.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ FILLERS = (
     "joint joints states the axis achse in of root model"
 )
 ANGLES = "angle winkel hoek theta phi omega drehzahl q"  # q: of a robot's joint
-LETTERS = ("t", "u", "y", "r", "q")  # roles of one letter give way to a word: y_position is of the axis y
+LETTERS = ("t", "u", "y", "r", "q")  # a word has priority over a role of one letter: y_position is of the axis y
 QUADRATURE = re.compile(r"(?<![a-zA-Z])[iI]_[qQ](?![a-zA-Z])")
 SOLL = re.compile(r"(?i)soll(wert)?")
-SYMBOLS = {"V": "input", "F": "input", "I": "input", "i": "input", "x": "output"}  # of physics: a role where nothing else has it
-RATE = re.compile(r"[\s_.\-](?P<of>(?!in[_/])[a-zA-Z]+)[_/]s(?P<twice>\^?2)?$")  # mm_s, deg/s, rad_s2; time_in_s is none
-LONG = 5  # letters from which a word counts inside a longer one: motorvoltage
+SYMBOLS = {"V": "input", "F": "input", "I": "input", "i": "input", "x": "output"}  # symbols of physics: used if no other column has the role
+RATE = re.compile(r"[\s_.\-](?P<of>(?!in[_/])[a-zA-Z]+)[_/]s(?P<twice>\^?2)?$")  # mm_s, deg/s, rad_s2, but not time_in_s
+LONG = 5  # least letters of a word that is found inside a longer one: motorvoltage
 
 
 USUAL: dict[Quantity, str] = {"voltage": "V", "command": "V", "current": "A", "torque": "N m", "force": "N", "unknown": "effort"}
@@ -50,7 +50,7 @@ MOVED: dict[Quantity, tuple[str, str]] = {"position": ("m", "rad"), "velocity": 
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What a name says. role: one of ``reading.ROLES``; quantity: what is measured; rank: the smaller, the likelier."""
+    """The meaning of a name. role: one of ``reading.ROLES``; quantity: that is measured; rank: the smaller, the more likely."""
 
     role: str
     quantity: Quantity
@@ -60,7 +60,7 @@ class Meaning:
 
 
 def header(cell: str) -> tuple[str, str]:
-    """Name and unit of a header like ``x_position[mm]``; brackets around a mere number, or a remark after a unit, belong to the name."""
+    """Name and unit of a header like ``x_position[mm]``; brackets around a number, or around a remark after a unit, belong to the name."""
     found = HEADER.match(cell)
     if found is None or not found["unit"] or (found["unit"].isdigit() and found["unit"] != "1"):
         return cell.strip(), ""
@@ -73,7 +73,7 @@ def header(cell: str) -> tuple[str, str]:
 
 
 def meaning(name: str, unit: str) -> Meaning | None:
-    """What a name and a unit say, None where they say nothing."""
+    """The meaning of a name and a unit; None if they have none."""
     words = _words(name)
     unit, words = _unit(name, unit, words)
     if any(word in OTHER.split() for word in words):
@@ -97,12 +97,12 @@ def meaning(name: str, unit: str) -> Meaning | None:
     fitting = MOVED if role in ("output", "reference") else USUAL
     if measured in fitting and measured != "unknown":
         quantity = measured
-    later = asked and role == "input" and quantity != "command"  # what was measured is likelier than what was asked for
+    later = asked and role == "input" and quantity != "command"  # a measured input is more likely than a commanded one
     return Meaning(role=role, quantity=quantity, axis="_".join(rest), unit=unit, rank=2 * rank + later)
 
 
 def by_unit(name: str, unit: str) -> str:
-    """input, output or nothing: what a column may be whose name says nothing, by its unit, or by being a symbol of physics."""
+    """The role of a column whose name has no meaning, by its unit or as a symbol of physics: input, output, or empty."""
     if any(word in OTHER.split() for word in spoken(name)):
         return ""
     quantity = unit_of(unit).quantity if unit else "unknown"
@@ -110,23 +110,23 @@ def by_unit(name: str, unit: str) -> str:
 
 
 def tells_time(name: str) -> bool:
-    """Whether a word of a name means the time; a single letter does not."""
+    """Whether a word of a name means the time; single letters do not count."""
     return any(word in TIME.split() and word not in LETTERS for word in spoken(name))
 
 
 def _words(name: str) -> list[str]:
-    """Small, numbers apart, and soll, what is asked for, apart; i_q, the current that turns a motor, is one."""
+    """The words of a name, in lower case, with numbers and soll (German: commanded) separated, and i_q (current) as one word."""
     return [piece for word in spoken(SOLL.sub(r" \g<0> ", QUADRATURE.sub("iq", name))) for piece in _pieces(word)]
 
 
 def _pieces(word: str) -> list[str]:
-    """joint1 stays; u1, pos2 are a word and a number."""
+    """A word that is split from its number if it has a role: u and 1, but joint1."""
     found = re.fullmatch(r"(\D+)(\d+)", word)
     return [found[1], found[2]] if found and _hits(found[1]) else [word]
 
 
 def _hits(word: str) -> list[tuple[str, Quantity, int]]:
-    """(role, quantity, rank) that a word may stand for, with accents or without."""
+    """(role, quantity, rank) that a word may mean, with or without accents."""
     word = "".join(sign for sign in unicodedata.normalize("NFKD", word) if not unicodedata.combining(sign))
     if word in TIME.split():
         return [("time", "time", 0)]
@@ -141,7 +141,7 @@ def _hits(word: str) -> list[tuple[str, Quantity, int]]:
 
 
 def _unit(name: str, unit: str, words: list[str]) -> tuple[str, list[str]]:
-    """A unit at the end of a name (time_ms, pos_mm, speed_rpm, torque_nm, vel_deg_s) where it fits what stands before it."""
+    """The unit, and the words without it: a unit at the end of a name (time_ms, pos_mm, vel_deg_s) if it fits the words before it."""
     rate = "" if unit else rate_at_end(name)
     if rate and any(role in ("output", "reference") or quantity == "command" for word in words[:-2] for role, quantity, _ in _hits(word)):
         return rate, words[:-2]
@@ -152,20 +152,20 @@ def _unit(name: str, unit: str, words: list[str]) -> tuple[str, list[str]]:
     spellings = [last, *FOLDED.get(last.casefold(), [])] if len(last) > 1 else [last]  # a single letter may be an axis
     for spelling in spellings:
         fits = KNOWN[spelling].quantity if spelling in KNOWN else "unknown"
-        drives = {"command": fits != "time", "unknown": fits in DRIVES}  # of an effort nothing is known but that it drives
+        drives = {"command": fits != "time", "unknown": fits in DRIVES}  # an effort is a drive signal of unknown quantity
         if fits != "unknown" and any(quantity == fits or (role == "input" and drives.get(quantity, False)) for role, quantity, _ in before):
             return spelling, words[:-1]
     return unit, words
 
 
 def rate_at_end(name: str) -> str:
-    """deg/s of speed_deg_s, mm/s^2 of acc_mm_s2; nothing of other names."""
+    """deg/s for speed_deg_s, mm/s^2 for acc_mm_s2; empty for other names."""
     found = RATE.search(name)
     return f"{found['of']}/s{'^2' if found['twice'] else ''}" if found is not None and found["of"] in POSITIONS else ""
 
 
 def unit_at_end(name: str, quantities: Container[Quantity]) -> str:
-    """The unit at the end of a name that says nothing else, if it is one of these quantities: deg of feedback_deg."""
+    """The unit at the end of a name without other meaning, if it is of one of these quantities: deg for feedback_deg."""
     last = re.split(r"[\s_.\-]+", name.strip())[-1]
     rate = rate_at_end(name)
     if rate and unit_of(rate).quantity in quantities:
@@ -174,7 +174,7 @@ def unit_at_end(name: str, quantities: Container[Quantity]) -> str:
 
 
 def usual_unit(name: str, found: Meaning) -> str:
-    """The unit of a column that names none; duty and pwm are parts of full scale."""
+    """The unit of a column that names none; duty and pwm are fractions of full scale."""
     words = _words(name)
     if found.quantity in MOVED:
         return MOVED[found.quantity][any(word in ANGLES.split() for word in words)]

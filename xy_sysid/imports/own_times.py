@@ -1,8 +1,8 @@
-"""Columns with times of their own --> columns of one clock: that of the first output.
+"""Columns with their own times --> columns on one clock, that of the first output.
 
-A column has a time of its own where the file says so, or where its numbers stand in rows of their own. The input is held until its next
-value, as a drive does: of a faster one the mean of the values from an instant to the next is taken, of a slower one the latest value.
-Outputs and references move between their values, and are interpolated.
+A column has its own time if the file says so, or if its numbers are in separate rows. The input is held until its next value, as a
+drive does: a faster input is averaged from each instant to the next, of a slower one the latest value is used. Outputs and references
+are interpolated.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from xy_sysid.imports.roles import Found, Roles
 from xy_sysid.imports.sheet import Column
 from xy_sysid.samples.block import FloatArray
 
-SAME = 1e-9  # s; instants that differ by less are one
-APART = 0.1  # of the rows with a first output; where more lack an input or another output, each column has a time of its own
+SAME = 1e-9  # s; instants that differ by less are equal
+APART = 0.1  # of the rows with a first output; if more lack an input or another output, each column has its own time
 
 
 def clocked(roles: Roles) -> bool:
-    """Whether columns bring times of their own, and no column was said to be the time."""
+    """Whether columns have their own times, and no column was chosen as the time."""
     return roles.time is None and any(column.clock is not None for column in roles.outputs.values())
 
 
 def with_own_times(roles: Roles, time: FloatArray, notes: list[str]) -> Roles:
-    """Each column with the instants of its numbers, where they stand in rows of their own; as they are elsewhere. time: (n,) s of all rows."""
+    """The roles with the instants of each column, if columns have numbers in separate rows; otherwise unchanged. time: (n,) s of all rows."""
     sides = [column for _, side in roles.sides() for column in side.values()]
     back = bool(np.any(np.diff(time[np.isfinite(time)]) < 0))
     if not roles.outputs or back or any(len(column.values) != len(time) or column.starts or column.words for column in sides):
@@ -52,9 +52,9 @@ def with_own_times(roles: Roles, time: FloatArray, notes: list[str]) -> Roles:
 
 
 def on_one_clock(path: Path, roles: Roles, notes: list[str]) -> tuple[Roles, Column]:
-    """The same roles with values at the instants of the first output, and that time, in s.
+    """The roles with values at the instants of the first output, and this time, s.
 
-    Raises BadRecording for columns without a clock beside some with one, or that share no time.
+    Raises BadRecording if only some columns have a clock, or if they share no time.
     """
     sides = [column for _, side in roles.sides() for column in side.values()]
     base = next(column for column in roles.outputs.values() if column.clock is not None)
@@ -83,7 +83,7 @@ def _same(one: FloatArray | None, other: FloatArray) -> bool:
 
 
 def _held(column: Column, instants: FloatArray) -> Column:
-    """From each of the instants to the next the mean of the values that are there, at least of the latest one."""
+    """The mean of the values from each instant to the next, or the latest value if there is none."""
     assert column.clock is not None
     rows = np.searchsorted(column.clock, instants + SAME, side="right") - 1
     sums = np.add.reduceat(column.values[: rows[-1] + 1], rows)
@@ -91,7 +91,7 @@ def _held(column: Column, instants: FloatArray) -> Column:
 
 
 def _moving(side: Found, instants: FloatArray) -> Found:
-    """Each column at the instants: its own values where it has one there, interpolated elsewhere."""
+    """Each column at the instants: its own value if it has one there, otherwise interpolated."""
     found: Found = {}
     for axis, column in side.items():
         assert column.clock is not None
@@ -105,7 +105,7 @@ def _moving(side: Found, instants: FloatArray) -> Found:
 
 
 def _between(clock: FloatArray, values: FloatArray, instants: FloatArray) -> FloatArray:
-    """Values (n,) at other instants; of two numbers of one instant the first counts."""
+    """Values (n,) at other instants; of two values at one instant the first is used."""
     here = np.isfinite(values) & np.isfinite(clock)
     here[here] = np.diff(clock[here], prepend=-np.inf) > 0
     return between(clock[here], values[here], instants)

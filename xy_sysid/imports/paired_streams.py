@@ -1,4 +1,4 @@
-"""Two streams of samples --> one Recording: paired by sample number, sorted, without repeats and without NaN."""
+"""Two streams of samples --> one Recording: paired by sample number, sorted, without repeated samples and without NaN."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from xy_sysid.imports.clock import disagreements, steps
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.samples.recording import SAME_RATE, Recording, rate_from_time
 
-LATE = 0.5  # s; a sample number that falls back further than that, for good, is a restart of the source
-FEW = 0.01  # part of the samples; more steps than that off their grid in both directions are jitter, not gaps
-STEPS = 100_000  # time steps from which the period is taken; of a longer stream every second, third, ... is looked at
-LARGEST = 2.0**53  # a counter beyond it is not exact in a double, so it is no counter
-LARGEST_VALUE = 1e100  # of a signal: its square must stay a number
-HOLLOW = 0.5  # part of the samples; an axis that has no numbers in more is left out rather than these samples
+LATE = 0.5  # s; a sample number that stays back further is a restart of the source
+FEW = 0.01  # of the samples; if more steps are off their grid in both directions, they are jitter, not gaps
+STEPS = 100_000  # most time steps for the period; of a longer stream every second, third, ... is used
+LARGEST = 2.0**53  # larger counters are not exact in a double, so they are not used
+LARGEST_VALUE = 1e100  # of a signal: its square must be finite
+HOLLOW = 0.5  # of the samples; an axis without numbers in more is left out, instead of these samples
 Fail = Callable[[str, str], BadRecording]
 Rows = NDArray[np.int64] | slice
 
@@ -35,19 +35,19 @@ class Stream:
 
 
 def is_jitter(steps: FloatArray) -> bool:
-    """Whether time steps, in whole periods, are off one because instants jitter: then too short and too long ones balance."""
+    """Whether time steps, in whole periods, differ from 1 because instants jitter: then short and long steps balance."""
     short, extra = float(np.sum(np.maximum(1 - steps, 0))), float(np.sum(np.maximum(steps - 1, 0)))
     return short + extra > FEW * len(steps) and short < 2 * extra < 4 * short
 
 
 def steady(time: FloatArray) -> FloatArray:
-    """Evenly spaced instants through jittering ones."""
+    """(n,) s, evenly spaced instants fitted to jittering ones."""
     count = np.arange(len(time)) - (len(time) - 1) / 2
     return np.asarray(time.mean() + count * (count @ (time - time.mean())) / (count @ count))
 
 
 def sane(values: FloatArray) -> NDArray[np.bool_]:
-    """(n,) rows whose numbers can be squared; if most are too large that is a matter of their unit, and not of single samples."""
+    """(n,) rows whose numbers can be squared; if most are too large, the unit is wrong and not single samples: then all finite rows."""
     finite = np.isfinite(values).all(axis=1)
     with np.errstate(invalid="ignore"):
         small = (np.abs(values) <= LARGEST_VALUE).all(axis=1)
@@ -55,7 +55,7 @@ def sane(values: FloatArray) -> NDArray[np.bool_]:
 
 
 def hollow(values: FloatArray) -> NDArray[np.bool_]:
-    """(axes,) whether an axis has hardly any numbers, so that it is left out rather than its rows."""
+    """(axes,) whether an axis has hardly any numbers, so that it is left out instead of its rows."""
     return np.asarray(np.mean(~np.isfinite(values), axis=0) > HOLLOW) if len(values) else np.zeros(values.shape[1], np.bool_)
 
 
@@ -79,10 +79,10 @@ def gather(name: str, blocks: Sequence[Block], axes: tuple[str, ...], notes: lis
 
 
 def sessions(seq: FloatArray, tolerance: float) -> list[int]:
-    """Where the source restarted its counter: first index of each session, 0 included.
+    """Restarts of the source's counter: first index of each session, 0 included.
 
-    A number that falls back by more than ``tolerance`` begins a session, unless the old numbers soon go on (then it was
-    a straggler, and sorting puts it right).
+    A number that falls back by more than ``tolerance`` begins a session, unless the old numbers soon continue: then it was a
+    late sample, which sorting corrects.
     """
     starts = [0]
     if bool(np.all(seq[1:] > seq[:-1])):
@@ -94,7 +94,7 @@ def sessions(seq: FloatArray, tolerance: float) -> list[int]:
         begin = 0
         for index in fallen[np.flatnonzero(np.diff(fallen, prepend=-2) > 1)].tolist():
             back = np.flatnonzero(part[index:] > highest[index] - tolerance)
-            ends_soon = len(part) - index <= tolerance < part[index]  # a late block at the end, and not a new beginning
+            ends_soon = len(part) - index <= tolerance < part[index]  # a late block at the end, not a restart
             if back[0] > tolerance if back.size else not ends_soon:
                 begin = index
                 break
@@ -110,7 +110,7 @@ def _steps(stream: Stream) -> FloatArray:
 
 
 def _merge(streams: dict[str, Stream], notes: list[str]) -> tuple[dict[str, Stream], float]:
-    """Give each session numbers and times of its own, after those of the session before; also the sampling period."""
+    """The streams with numbers and times of each session after those of the session before; and the sampling period, s."""
     steps = np.concatenate([_steps(stream) for stream in streams.values()])
     period = float(np.median(steps)) if len(steps) else 0.0
     tolerance = LATE / period if period > 0 else 1000.0
@@ -155,7 +155,7 @@ def _merge(streams: dict[str, Stream], notes: list[str]) -> tuple[dict[str, Stre
 
 
 def _sorted(name: str, stream: Stream, notes: list[str]) -> Stream:
-    """In the order of seq; of samples with the same number the first is kept."""
+    """The stream in the order of seq; of samples with the same number the first is kept."""
     if not bool(np.all(np.diff(stream.seq) > 0)):
         order = np.argsort(stream.seq, kind="stable")
         seq = stream.seq[order]
@@ -170,9 +170,9 @@ def _sorted(name: str, stream: Stream, notes: list[str]) -> Stream:
 
 
 def pair(streams: dict[str, Stream], source: str, units: tuple[str, str], notes: list[str], fail: Fail) -> Recording:
-    """The recording of the samples that both "voltage" and "position" have; "reference" where it has them too.
+    """The recording of the samples that "voltage" and "position" share, with "reference" if it covers them all.
 
-    Raises what ``fail`` makes if nothing can be paired or if the streams run at different rates.
+    Raises the error of ``fail`` if nothing can be paired or if the streams have different rates.
     """
     streams, period = _merge(streams, notes)
     slips = _watched(streams, period, notes)
@@ -213,7 +213,7 @@ def pair(streams: dict[str, Stream], source: str, units: tuple[str, str], notes:
 
 
 def _watched(streams: dict[str, Stream], period: float, notes: list[str]) -> list[float]:
-    """Notes on where time and counter part; sample numbers at which one counter slips and the other does not."""
+    """The sample numbers at which only one counter slips; adds notes on differences between time and counter."""
     if period <= 0:
         return []
     slips: dict[str, set[float]] = {}
@@ -221,14 +221,14 @@ def _watched(streams: dict[str, Stream], period: float, notes: list[str]) -> lis
         stream = streams[name]
         notes += disagreements(f"the {name}", stream.seq, stream.time, 1.0 / period)
         found = steps(stream.seq, stream.time, 1.0 / period)[1]
-        slips[name] = {float(stream.seq[row]) - min(0, round(size)) for row, size in found}  # of numbers that come again the first are kept
+        slips[name] = {float(stream.seq[row]) - min(0, round(size)) for row, size in found}  # of repeated numbers the first are kept
     return sorted(slips["voltage"] ^ slips["position"])
 
 
 def _paired_alike(
     seq: FloatArray, places: tuple[Rows, Rows], apart: FloatArray, slips: list[float], notes: list[str]
 ) -> tuple[FloatArray, Rows, Rows]:
-    """The part between slips of one counter alone that is paired rightly by its stamps, or else the longest.
+    """The part between slips of one counter whose stamps agree best; of equal ones the longest.
 
     apart: (n,) periods by which the stamps of each pair differ
     """
@@ -245,7 +245,7 @@ def _paired_alike(
 
 
 def _common(one: FloatArray, other: FloatArray) -> tuple[FloatArray, Rows, Rows]:
-    """Sample numbers that both have, and where; both are sorted and without repeats."""
+    """Sample numbers that both have, and their rows; both are sorted and without repeated numbers."""
     if np.array_equal(one, other):
         return one, slice(None), slice(None)
     place = np.minimum(np.searchsorted(other, one), len(other) - 1)
@@ -271,7 +271,7 @@ def _reference(stream: Stream | None, seq: FloatArray, notes: list[str]) -> Floa
 
 
 def cut(recording: Recording, begin: float, start: float, stop: float | None) -> Recording:
-    """The part from ``start`` to before ``stop``, s after the instant ``begin``; raises BadInput if that is too little."""
+    """The part from ``start`` to before ``stop``, s after the instant ``begin``; raises BadInput for fewer than 2 samples."""
     if start <= 0 and stop is None:
         return recording
     elapsed = recording.time - begin

@@ -1,6 +1,6 @@
-"""Warnings about a recording, in words. Nothing is corrected, because only the user knows the truth.
+"""Warnings about a recording, in words. Values are not corrected, because only the user knows the true ones.
 
-Thresholds are wide of any machine axis that was met in measured data (../docs/real-data.md); they only ask.
+Thresholds are far beyond every machine axis in the measured data (../docs/real-data.md); they only cause questions.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.moves import ONE_MOVE, one_move
 from xy_sysid.samples.recording import SLOWEST, Recording
 
-HUGE = 1e100  # a number beyond it has no square, let alone the square of its derivative
-FAR, FAST = 20.0, 50.0  # m and m/s; longer or faster axes are asked about
+HUGE = 1e100  # larger numbers, or their derivatives, have no finite square
+FAR, FAST = 20.0, 50.0  # m and m/s; longer or faster axes cause a question
 TURNING = 3000.0  # rad/s, 30,000 turns a minute
-TINY = {"m": 1e-8, "rad": 1e-8, "V": 1e-6, "A": 1e-6}  # a signal that moves less in all is asked about
+TINY = {"m": 1e-8, "rad": 1e-8, "V": 1e-6, "A": 1e-6}  # a signal with a smaller range causes a question
 ROUGH = 0.5  # steps over spread; a position is smoother than that, noise is not
-SMOOTHER = 0.25  # of the output's roughness; an input that is that much smoother may be a position
-LIKE = 0.5  # correlation of one signal's steps with the other, when they have been swapped
-LEAKS = (1.0, 0.3, 0.1, 0.03, 0.01)  # of the axis that is asked about then, part of a step
-STUCK_SECONDS, STUCK_PART = 1.0, 0.1  # an output that stands for longer and for more of the recording, while the input moves
-DEAD_PART = 0.2  # of the recording; a longer rest under a lively input is taken out
-LIVELY = 0.8  # of the input's spread and steps elsewhere; an output that stands under as much input is not held by friction
-CLIPPED = 0.05  # part of the samples that lie at one end of the range
-LEVELS = 8  # a signal of fewer levels is a switching one, and lies at its ends by nature
-COARSE = 0.02  # of the usual step; numbers further apart than that, because of an offset, say little
-FEW = 4  # counts in all
-ENOUGH = 50  # samples
-LOOK = 200_000  # samples from which steps and levels are counted
+SMOOTHER = 0.25  # of the output's roughness; a smoother input may be a position
+LIKE = 0.5  # least correlation of one signal's steps with the other, if they have been swapped
+LEAKS = (1.0, 0.3, 0.1, 0.03, 0.01)  # poles of the assumed axis in the test for swapped signals, per sample
+STUCK_SECONDS, STUCK_PART = 1.0, 0.1  # s, and part of the recording: a longer rest of the output while the input moves is reported
+DEAD_PART = 0.2  # of the recording; a longer rest while the input moves as elsewhere is left out
+LIVELY = 0.8  # of the input's spread and steps elsewhere; with as much input it is not friction that holds the output
+CLIPPED = 0.05  # part of the samples at one end of the range
+LEVELS = 8  # a signal of fewer levels is a switching one, and is often at its ends
+COARSE = 0.02  # of the usual step; coarser resolution of numbers, due to an offset, is reported
+FEW = 4  # different values of an output
+ENOUGH = 50  # least samples for warnings
+LOOK = 200_000  # most samples for steps and levels
 
 
 def meaningful(path: Path, recording: Recording) -> Recording:
-    """Without the axes whose input and output are one and the same; raises BadRecording if none is left, or for numbers beyond any unit."""
+    """The recording without axes whose input and output are equal. Raises BadRecording if none is left, or for numbers above ``HUGE``."""
     for name, values in (("input", recording.voltage), ("output", recording.position)):
         largest = float(np.max(np.abs(values))) if values.size else 0.0
         if largest > HUGE:
@@ -64,9 +64,9 @@ def meaningful(path: Path, recording: Recording) -> Recording:
 
 
 def without_dead_parts(recording: Recording) -> Recording:
-    """Without long stretches in which an output does not change by a bit under an input as lively as elsewhere: they become gaps.
+    """The recording without long stretches in which an output is constant while the input moves as elsewhere: they become gaps.
 
-    If the output also rests long elsewhere, the axis is held, and its encoder works: the joints of a robot move one after another.
+    If the output also rests long elsewhere, the axis is held and its encoder works, as when the joints of a robot move one after another.
     """
     if len(recording) < ENOUGH:
         return recording
@@ -95,13 +95,13 @@ def without_dead_parts(recording: Recording) -> Recording:
 
 
 def _compared(u: FloatArray, inside: NDArray[np.bool_]) -> list[tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]]:
-    """The input and its steps, with where to look at them: inside and outside."""
+    """The input and its steps, each with its rows inside and outside."""
     both = inside[1:] & inside[:-1], ~inside[1:] & ~inside[:-1]
     return [(u, inside, ~inside), (np.diff(u), *both)]
 
 
 def _is_long(rest: int, y: FloatArray, sampling_rate: float) -> bool:
-    """Whether a rest of so many samples is long in time, and a large part of the output."""
+    """Whether a rest of this many samples is long in time, and a large part of the output."""
     return rest >= STUCK_SECONDS * sampling_rate and rest >= STUCK_PART * len(y)
 
 
@@ -118,11 +118,11 @@ def _between(recording: Recording, begin: int, size: int) -> str:
 
 
 def remarks(recording: Recording, output: FloatArray) -> list[str]:
-    """Sentences about the whole and about each axis. output: (n, axes) what was measured, which may be a velocity."""
+    """Warnings about the recording and about each axis. output: (n, axes) the measured quantity, which may be a velocity."""
     if len(recording) < ENOUGH:
         return _of_units(recording)
     found = _of_time(recording)
-    with np.errstate(all="ignore"):  # numbers near the end of their range have no square; what is odd about them is said
+    with np.errstate(all="ignore"):  # numbers near the end of their range have no square; they are reported
         for place, axis in enumerate(recording.axes):
             u = recording.voltage[:, place]
             of_motion = _of_motion(recording, u, recording.position[:, place])
@@ -191,7 +191,7 @@ def _of_axis(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
 
 
 def _of_motion(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
-    """Too little of it to tell anything by."""
+    """Warnings about too little motion."""
     runs = recording.runs()
     if len(runs) > 1 and float(np.ptp(u)) > 0.0 and all(float(np.ptp(u[run])) == 0.0 for run in runs):
         return [f"the input keeps one value in each of the {len(runs)} stretches: only the final speed of each can be determined"]
@@ -203,7 +203,7 @@ def _per(recording: Recording) -> str:
 
 
 def _of_size(recording: Recording, y: FloatArray, size: float) -> list[str]:
-    """Travel, speed and resolution of a position."""
+    """Warnings about travel, speed and resolution of a position."""
     found = []
     step = float(np.quantile(np.abs(np.diff(y[:LOOK])), 0.9))
     if recording.measured == "position":
@@ -229,7 +229,7 @@ def _of_size(recording: Recording, y: FloatArray, size: float) -> list[str]:
 
 
 def _swapped(u: FloatArray, y: FloatArray) -> str:
-    """A smooth input that follows the integral of a rough output."""
+    """A warning if a smooth input follows the integral of a rough output; empty otherwise."""
     rough = [float(np.std(np.diff(values)) / np.std(values)) for values in (u, y)]
     if not (np.isfinite(rough).all() and rough[1] > ROUGH and rough[0] < SMOOTHER * rough[1]):
         return ""
@@ -247,7 +247,7 @@ def _leaky(values: FloatArray, leak: float) -> FloatArray:
 
 
 def _stuck(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
-    """The longest stretch over which the output does not change by a bit, although the input goes on."""
+    """A warning about the longest stretch in which the output is constant although the input moves."""
     begin, size = _longest_rest(y)
     if not _is_long(size, y, recording.sampling_rate):
         return []
@@ -261,7 +261,7 @@ def _stuck(recording: Recording, u: FloatArray, y: FloatArray) -> list[str]:
 
 
 def _clipped(name: str, values: FloatArray, unit: str) -> list[str]:
-    """Samples that lie exactly at the end of the range."""
+    """Warnings about many samples exactly at an end of the range."""
     if len(np.unique(values[:LOOK])) <= LEVELS:
         return []
     found = []

@@ -1,4 +1,4 @@
-"""How a file is to be read: one value that every reader takes, made from keywords or from the options of a command."""
+"""Options for reading a file, which every reader takes, from keywords or from the options of a command."""
 
 from __future__ import annotations
 
@@ -22,17 +22,18 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Which columns of a file mean what.
+    """The meaning of a file's columns, and the part to read.
 
-    columns: column by what it is, {"time": "Zeit", "x.input": "Motor Voltage", "output": "Pos"}; without an axis: of any
-    units:   unit by what it is, {"x.output": "counts", "time": "ms"}; scales: factor to SI, or to ``units``
-    rate:    Hz; samples are taken as they stand, evenly spaced, whatever a time column says
-    axes:    which axes to take, and in which order; None is all
-    start, stop: s after the first sample; None is the end
-    voltage_topic, position_topic: block topics of a bag; joint_topic: its JointState topic, found if there is one only
-    effort_as_voltage: take the joints' effort as the input, even if there is a voltage topic
+    columns: column by role, {"time": "Zeit", "x.input": "Motor Voltage", "output": "Pos"}; without an axis: for any axis
+    units:   unit by role, {"x.output": "counts", "time": "ms"}; scales: factor to SI, or to ``units``
+    rate:    Hz; samples are used as evenly spaced, and a time column is ignored
+    axes:    the axes to read, in this order; None: all
+    start, stop: s after the first sample; None: the end
+    voltage_topic, position_topic: block topics of a bag; joint_topic: its JointState topic, found if there is only one
+    effort_as_voltage: use the joints' effort as the input, even if there is a voltage topic
     joints:  the joint of each axis, as x=shoulder_pan_joint; effort_lag: samples by which effort is older than its stamp
-    velocity: take the joints' velocity as the output, even if there are positions
+    velocity: use the joints' velocity as the output, even if there are positions
+    Raises BadInput for values out of range and unknown roles.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -67,7 +68,7 @@ class Reading:
                 raise BadInput("--scale", f"{what}={scale}", "a number that is not 0", "Give the factor to SI.")
 
     def a_response(self, looks_so: bool) -> bool:
-        """Whether a file holds a measured frequency response, as the columns say that were chosen, or else as it looks."""
+        """Whether a file holds a measured frequency response: by the chosen columns, otherwise by its content (``looks_so``)."""
         if any(what in OF_A_RESPONSE for what in self.columns):
             return True
         return looks_so and not any(what.rpartition(".")[2] in OF_AN_AXIS for what in self.columns)
@@ -90,7 +91,7 @@ def _of(given: Mapping[str, Value], role: str, axis: str) -> Value | None:
 
 
 def pairs(texts: Sequence[str], option: str) -> dict[str, str]:
-    """WHAT=VALUE pairs, several in one text separated by commas: {"time": "Zeit", "x.input": "Motor Voltage"}."""
+    """WHAT=VALUE pairs as {"time": "Zeit", "x.input": "Motor Voltage"}; a text may hold several, separated by commas. Raises BadInput."""
     found: dict[str, str] = {}
     for text in texts:
         for pair in PAIR.split(text):
@@ -104,7 +105,7 @@ def pairs(texts: Sequence[str], option: str) -> dict[str, str]:
 
 
 def numbers(texts: Sequence[str], option: str) -> dict[str, float]:
-    """The same with numbers as values."""
+    """``pairs`` with numbers as values. Raises BadInput."""
     found: dict[str, float] = {}
     for what, text in pairs(texts, option).items():
         try:

@@ -1,4 +1,4 @@
-"""Which reader takes which file: a new kind of file is one module and one row of ``FORMATS``."""
+"""The reader of each kind of file: a new kind is one module and one row of ``FORMATS``."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from xy_sysid.imports.limits import COPY, fits
 from xy_sysid.imports.sheet import Sheet
 
 TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".prn", ".log")
-HEAD = 65536  # bytes by which text formats are distinguished
-COPIES = 2  # bytes in memory for one in a file of text
+HEAD = 65536  # first bytes, which distinguish text formats
+COPIES = 2  # bytes in memory for each byte of a text file
 BAGS = ("", ".db3", ".mcap")
 
 
@@ -25,9 +25,9 @@ class Format:
     """One kind of file.
 
     kind:    its name in listings
-    endings: of such files, small; begins: what their first bytes must match, for kinds that share an ending
-    module:  of this package, with ``sheet(path)``; or else library: a file of ``libraries``, run in a process of its own
-    extra:   of the package, that installs the library
+    endings: in lower case; begins: pattern of the first bytes, for kinds that share an ending
+    module:  of this package, with ``sheet(path)``; otherwise library: a file of ``libraries``, run in a separate process
+    extra:   of this package, installs the library
     """
 
     kind: str
@@ -38,7 +38,7 @@ class Format:
     extra: str = ""
 
 
-FORMATS = (  # the first that fits is taken
+FORMATS = (  # the first that fits is used
     Format("twincat", TEXT, r"(?s)Name\t.*\nSampleTime\[ms\]", module="twincat"),
     Format("codesys", TEXT, r"\[key\]\s*;\s*\[value\]", module="codesys"),
     Format("mitsubishi", TEXT, r"(?s).*\bSampling time interval\(\w+\)", module="mitsubishi"),
@@ -61,7 +61,7 @@ KINDS = f"a rosbag2 folder, .db3, .mcap, {', '.join(ending for ending in TABLES 
 
 
 def format_of(path: Path) -> Format:
-    """The kind of a file; raises BadRecording for what is none of them, OSError for what is not there."""
+    """The kind of a file; raises BadRecording for an unknown kind or an empty file, OSError for a missing one."""
     suffix = "" if path.is_dir() else path.suffix.lower()
     path.stat()
     if suffix in BAGS:
@@ -76,14 +76,14 @@ def format_of(path: Path) -> Format:
 
 
 def _head(path: Path) -> str:
-    """The first characters, one for each byte (of UTF-16 one for each two)."""
+    """The first characters, one for each byte (for UTF-16 one for each two)."""
     with path.open("rb") as file:
         head = file.read(HEAD)
     return head.removeprefix(b"\xef\xbb\xbf").replace(b"\0", b"").removeprefix(b"\xff\xfe").decode("latin-1")
 
 
 def sheet_of(path: Path, kind: Format) -> Sheet:
-    """The columns of a file. Raises BadRecording, or MissingExtra where its library is not installed."""
+    """The columns of a file. Raises BadRecording, or MissingExtra if its library is not installed."""
     if kind.library:
         return sheet_of_leaves(path, guarded.leaves(path, kind.library, kind.extra))
     if kind.endings == TEXT:

@@ -1,7 +1,7 @@
-"""A file with a measured frequency response: frequency, and magnitude with phase or real with imaginary part. There is no time in it.
+"""A file with a measured frequency response: frequency, and magnitude with phase or real with imaginary part, without time.
 
-What numbers mean is told by the headers, and by the numbers where these contradict them; every choice is said. Where nothing else tells whether a
-magnitude is in dB, the phase does: of a minimum-phase system it is 90 degrees for each 20 dB a decade (Bode 1945, ch. XIV).
+The headers give the meaning of the numbers, unless the numbers contradict them; every choice is noted. If nothing else shows whether a
+magnitude is in dB, the phase does: for a minimum-phase system it is 90 degrees for each 20 dB per decade (Bode 1945, ch. XIV).
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ UNITS = re.compile(r"[^\W\d_]+|[%°]")  # of m/s^2/V they are m, s and V
 DECIBEL = re.compile(r"(?i)(?<![a-z])db(?![a-z])")
 HERTZ = {"hz": 1.0, "khz": 1e3, "MHz": 1e6, "mhz": 1e-3}
 TURN = 2 * np.pi
-JUMP = 0.5  # rad; a phase whose usual step from line to line is more, once turns are taken off, is no smooth one
+JUMP = 0.5  # rad; a phase whose usual step from line to line is larger, modulo a turn, is not smooth
 EXAMPLE = "Name them with --map frequency=1,magnitude=2,phase=3, or real= and imag= (see xy-sysid columns FILE)."
 
 
@@ -49,9 +49,9 @@ def sheet(path: Path) -> Sheet:
 
 
 def responses(path: Path, sheet: Sheet, reading: Reading, known: Mapping[str, Any] | None = None) -> dict[str, FrequencyResponse]:
-    """The response of each axis: of one, x, if the file names none. known: fields of ``Known`` that the file does not say.
+    """The response of each axis; one axis x if the file names none. known: fields of ``Known`` that the file does not have.
 
-    Raises BadRecording or BadInput that say what is missing.
+    Raises BadRecording or BadInput, which name the missing part.
     """
     columns = {role: column for role in NAMES if (column := column_of(sheet, role, reading)) is not None}
     _complete(path, sheet, columns)
@@ -71,13 +71,13 @@ def frf_from(
     units: Mapping[str, str] | None = None,
     **known: Any,
 ) -> FrequencyResponse:
-    """A frequency response that was measured elsewhere, for ``fit``, ``plot`` and all that needs no samples.
+    """A frequency response that was measured elsewhere, for ``fit``, ``plot`` and other functions that need no samples.
 
     source:   a file, or (m,) frequencies in Hz with ``response``, (m,) complex
-    axis:     its name, of a file of several the one to take; units: {"input": "V", "output": "rad"}, of a file also {"phase": "deg"}
-    columns:  of a file, as ``--map`` says them: {"frequency": "1", "magnitude": "2", "phase": "3"}
+    axis:     its name, or the one to read from a file of several; units: {"input": "V", "output": "rad"}, for a file also {"phase": "deg"}
+    columns:  of a file, as for ``--map``: {"frequency": "1", "magnitude": "2", "phase": "3"}
     known:    sigma, (m,) standard deviation of the complex error; coherence, (m,), with its averages; sampling_rate, Hz
-    What was understood is in ``origin.notes``. Raises BadInput or BadRecording.
+    The interpretation of the file is in ``origin.notes``. Raises BadInput or BadRecording.
     """
     names = [field.name for field in dataclasses.fields(Known)]
     for name in known:
@@ -100,7 +100,7 @@ def frf_from(
 
 
 def column_of(sheet: Sheet, role: str, reading: Reading) -> Column | None:
-    """The column of a role: the one that was said, or whose first word is one of its names."""
+    """The column of a role: the chosen one, or one whose first word is a name of the role; None if there is none."""
     if role in reading.columns:
         return sheet.find(reading.columns[role])
     known = NAMES[role].split()
@@ -154,7 +154,7 @@ def _hertz(column: Column, values: FloatArray, reading: Reading, notes: list[str
 
 
 def _radians(column: Column, values: FloatArray, reading: Reading, notes: list[str]) -> FloatArray:
-    """Phases in rad. A header of rad is not believed where the phase would leap by turns from line to line."""
+    """Phases in rad. A header of rad is ignored if the phase would jump by turns from line to line."""
     told = reading.units.get("phase", "")
     said = told or column.unit
     words = {*spoken(said), *(() if told else spoken(column.name))}
@@ -178,7 +178,7 @@ def _unknown(what: str, said: str, allowed: str) -> BadInput:
 
 
 def _linear(column: Column, lines: tuple[FloatArray, FloatArray, FloatArray], reading: Reading, notes: list[str]) -> FloatArray:
-    """Magnitudes as they are, from dB where they are in dB. lines: frequency Hz, magnitude, phase rad."""
+    """Linear magnitudes, converted if they are in dB. lines: frequency, Hz, magnitude, phase, rad."""
     frequency, values, phase = lines
     told, units = reading.units.get("magnitude", ""), UNITS.findall(column.unit)
     if told or DECIBEL.search(f"{column.name} {column.unit}"):

@@ -1,7 +1,7 @@
-"""Columns of a file --> their roles: which column is the time, and which are input, output and reference of each axis.
+"""Columns of a file --> their roles: the time, and input, output and reference of each axis.
 
-What the user says (``Reading.columns``) comes first, then the contract's own names (``time``, ``x_voltage``,
-``x_position``), then what the words of a name say; what was guessed is said in a note.
+The user's choice (``Reading.columns``) has priority, then the contract's names (``time``, ``x_voltage``, ``x_position``), then the words of a
+name; a note reports guesses.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ CONTRACT: Mapping[str, tuple[str, ...]] = {
     "output": ("position", "y", "output"),
     "reference": ("reference", "r"),
 }
-WORDS: Mapping[str, str] = {"input": "voltage", "output": "position"}  # how a missing role is called in an error
+WORDS: Mapping[str, str] = {"input": "voltage", "output": "position"}  # names of a missing role in an error
 JOINT_WORDS = ({"joint"}, {"joint", "name"}, {"name"}, {"axis"}, {"axis", "name"}, {"achse"}, {"gelenk"}, {"joint", "id"})
 EXAMPLE = "Name them with --map time=...,input=...,output=... (see xy-sysid columns FILE)."
 Found = dict[str, Column]
@@ -28,7 +28,7 @@ Found = dict[str, Column]
 
 @dataclass(frozen=True, slots=True)
 class Roles:
-    """Columns by role; guessed: whether a name had to be understood, which a note then says."""
+    """Columns by role; guessed: whether a role was guessed from a name, which a note then reports."""
 
     time: Column | None
     seq: Column | None
@@ -39,17 +39,17 @@ class Roles:
     guessed: bool
 
     def sides(self) -> tuple[tuple[str, Found], ...]:
-        """Columns by axis, of each role that an axis has."""
+        """Role and its columns by axis, for input, output and reference."""
         return ("input", self.inputs), ("output", self.outputs), ("reference", self.references)
 
     def of(self, axes: Sequence[str]) -> Roles:
-        """Of some axes only."""
+        """The roles of some axes only."""
         inputs, outputs, references = ({axis: side[axis] for axis in axes if axis in side} for _, side in self.sides())
         return replace(self, inputs=inputs, outputs=outputs, references=references)
 
 
 def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
-    """Which columns are what."""
+    """The columns of each role. Raises BadRecording if an input or output is missing or ambiguous."""
     said = {what: sheet.find(name) for what, name in reading.columns.items() if "." in what or what in ("time", "seq", "joint")}
     meanings = {column.name: understood for column in sheet.columns if (understood := meaning(column.name, column.unit)) is not None}
     found, guessed = _sides(sheet, reading, said, meanings, notes)
@@ -72,7 +72,7 @@ def assigned(sheet: Sheet, reading: Reading, notes: list[str]) -> Roles:
 
 
 def _sides(sheet: Sheet, reading: Reading, said: Found, meanings: Mapping[str, Meaning], notes: list[str]) -> tuple[dict[str, Found], bool]:
-    """Input, output and reference of each axis: as said, by the contract's names, by words, or by units; and whether words were understood."""
+    """Input, output and reference of each axis: as chosen, by the contract's names, by words, or by units; and whether words were used."""
     found: dict[str, Found] = {}
     plain, guessed = _contract(sheet), False
     for role in OF_AN_AXIS:
@@ -92,7 +92,7 @@ def _sides(sheet: Sheet, reading: Reading, said: Found, meanings: Mapping[str, M
 
 
 def _time(sheet: Sheet, said: Found, meanings: Mapping[str, Meaning], notes: list[str]) -> tuple[Column | None, bool]:
-    """The column of instants, and whether its name had to be understood."""
+    """The column of instants, and whether it was guessed from its name."""
     if "time" in said:
         return said["time"], False
     clocks = [column for column in sheet.columns if column.name in meanings and meanings[column.name].role == "time"]
@@ -107,7 +107,7 @@ def _time(sheet: Sheet, said: Found, meanings: Mapping[str, Meaning], notes: lis
 
 
 def _by_steps(sheet: Sheet, known: Container[str], notes: list[str]) -> Column | None:
-    """The only column that no name and no role claims and that rises evenly, by less than the slowest samples of an axis: the time, in s."""
+    """The only column without a meaning or role that rises evenly, by less than the longest period of an axis: it is used as the time, s."""
     rest = [column for column in sheet.columns if not column.unit and column.name not in known]
     clocks = [column for column in rest if 0.0 < column.step < 1.0 / SLOWEST]
     if len(clocks) != 1:
@@ -130,7 +130,7 @@ def _contract(sheet: Sheet) -> dict[str, Found]:
 
 
 def _ending(sheet: Sheet, ending: str) -> Found:
-    """Columns called ``<axis>_<ending>``, or only ``ending``, which is the axis x."""
+    """Columns named ``<axis>_<ending>``, or only ``ending``, which is the axis x."""
     found: Found = {}
     for column in sheet.columns:
         axis, _, last = column.name.rpartition("_")
@@ -140,7 +140,7 @@ def _ending(sheet: Sheet, ending: str) -> Found:
 
 
 def _of_any_axis(sheet: Sheet, name: str) -> Found:
-    """A column of that name, or the columns of all axes that end in it."""
+    """The column of this name, or the columns of all axes whose names end in it."""
     if name not in [column.name for column in sheet.columns]:
         columns = _ending(sheet, name)
         if columns:
@@ -149,13 +149,13 @@ def _of_any_axis(sheet: Sheet, name: str) -> Found:
 
 
 def _paired(found: Mapping[str, Found]) -> bool:
-    """Whether any axis has both input and output, or could have."""
+    """Whether an axis has both input and output, or may have."""
     inputs, outputs = found["input"], found["output"]
     return bool(set(inputs) & set(outputs)) or (len(inputs) == len(outputs) == 1 and ("" in inputs or "" in outputs))
 
 
 def _by_words(sheet: Sheet, meanings: Mapping[str, Meaning], role: str, notes: list[str]) -> Found:
-    """For each axis the likeliest column of a role."""
+    """The most likely column of a role, for each axis. Raises BadRecording if two are equally likely."""
     offers: dict[str, list[tuple[int, Column]]] = {}
     for column in sheet.columns:
         known = meanings.get(column.name)
@@ -177,7 +177,7 @@ def _by_words(sheet: Sheet, meanings: Mapping[str, Meaning], role: str, notes: l
 
 
 def _by_unit(sheet: Sheet, meanings: Mapping[str, Meaning], role: str) -> Found:
-    """The column whose unit alone says that it has a role; raises BadRecording if there are several."""
+    """The column that has a role by its unit or symbol alone; raises BadRecording if there are several."""
     columns = [column for column in sheet.columns if column.name not in meanings and not column.words and by_unit(column.name, column.unit) == role]
     if len(columns) > 1:
         names = " and ".join(repr(column.name) for column in columns)
@@ -186,7 +186,7 @@ def _by_unit(sheet: Sheet, meanings: Mapping[str, Meaning], role: str) -> Found:
 
 
 def _named(sheet: Sheet, found: dict[str, Found], notes: list[str]) -> dict[str, Found]:
-    """The same with a name for every axis; raises BadRecording if no axis has both input and output."""
+    """The columns with a name for every axis; raises BadRecording if no axis has both input and output."""
     inputs, outputs = found["input"], found["output"]
     if len(inputs) == len(outputs) == 1 and set(inputs) != set(outputs) and ("" in inputs or "" in outputs or not _contract(sheet)):
         axis = next((name for name in (*outputs, *inputs) if name), "x")

@@ -1,4 +1,4 @@
-"""Several recordings of one machine: read alike, checked to belong together, and as one where a command takes one."""
+"""Several recordings of one machine: read with the same options, checked for equal units and axes, and joined to one."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.several_files import others
 from xy_sysid.samples.recording import SAME_RATE, Recording
 
-NAMED = 3  # recordings that a note names
+NAMED = 3  # most recordings that a note names
 
 
 def read_all(paths: Sequence[Path], reading: Reading, progress: Callable[[float], None] | None = None) -> tuple[Recording, ...]:
-    """Each of the recordings, with the axes that all of them have; of several, each note says which it is about.
+    """The recordings, each with the axes that all of them have; if there are several, each note names its recordings.
 
-    Raises BadRecording or BadInput: what cannot be read, units that differ, no axis in common.
+    Raises BadRecording or BadInput for a file that cannot be read, units that differ, or no common axis.
     """
     if not paths:
         raise BadInput("recordings", "none", "one or more", "Give a file.")
@@ -40,7 +40,7 @@ def read_all(paths: Sequence[Path], reading: Reading, progress: Callable[[float]
 
 
 def _said_once(found: list[Recording]) -> tuple[Recording, ...]:
-    """The same with each note once, at the first recording that has it: of all of them, or of those that it names."""
+    """The recordings with each note once, at the first recording that has it, with the names of all that have it."""
     whose: dict[str, list[str]] = {}
     for one in found:
         for note in dict.fromkeys(one.notes):
@@ -85,7 +85,7 @@ def _alike(found: list[Recording]) -> list[Recording]:
 
 
 def joined(recordings: Sequence[Recording]) -> Recording:
-    """One recording of all, with a gap between each and the next; its time goes on. Raises BadInput if their rates differ."""
+    """One recording of all, with a gap between each and the next, and continuing time. Raises BadInput if their rates differ."""
     first = recordings[0]
     if len(recordings) == 1:
         return first

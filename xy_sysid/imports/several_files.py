@@ -19,9 +19,9 @@ from xy_sysid.samples.block import FloatArray
 
 
 def of_several_files(path: Path, reading: Reading, notes: list[str]) -> tuple[Sheet, Reading] | None:
-    """One sheet of the columns of all files that the reading names, and the reading that goes with it; None if it names no file.
+    """One sheet with the columns of all files that the reading names, and the reading for this sheet; None if it names no file.
 
-    Files that all have a time are joined by it, others by row. Raises BadRecording if their rows do not fit together.
+    The files are joined by their times if all have one, otherwise by row. Raises BadRecording if their numbers of rows differ then.
     """
     named = {what: found for what, column in reading.columns.items() if (found := file_and_column(path, column)) is not None}
     if not named:
@@ -52,7 +52,7 @@ def of_several_files(path: Path, reading: Reading, notes: list[str]) -> tuple[Sh
 
 
 def file_and_column(path: Path, text: str) -> tuple[Path, str] | None:
-    """The file and the column in it that FILE:COLUMN names; a file lies beside ``path`` or where it says. None if there is no such file."""
+    """The file and the column that FILE:COLUMN names, FILE relative to the folder of ``path`` or as given. None if there is no such file."""
     name, colon, column = text.rpartition(":")
     if not (colon and name and column):
         return None
@@ -66,7 +66,7 @@ def file_and_column(path: Path, text: str) -> tuple[Path, str] | None:
 
 
 def others(path: Path, columns: Mapping[str, str]) -> set[Path]:
-    """The files that FILE:COLUMN name, each as one absolute path."""
+    """The absolute paths of the files that FILE:COLUMN texts name."""
     return {found[0].resolve() for text in columns.values() if (found := file_and_column(path, text)) is not None}
 
 
@@ -75,7 +75,7 @@ def _is_table(path: Path) -> bool:
 
 
 def _stamps(sheet: Sheet, time: str, reading: Reading) -> Stamps | None:
-    """The instants of a file that has a column for them, or whose column ``time`` they are said to be."""
+    """The instants of a file, from its column ``time`` if given, otherwise from a column with that meaning; None without one."""
     if time:
         return stamps(sheet.path, sheet.find(time), reading, [])
     for column in sheet.columns:
@@ -86,7 +86,7 @@ def _stamps(sheet: Sheet, time: str, reading: Reading) -> Stamps | None:
 
 
 def _on_one_clock(found: Mapping[Path, Stamps | None]) -> dict[Path, FloatArray] | None:
-    """The instants of each file in s from one origin; None unless all have some."""
+    """The instants of each file, s, from one origin; None unless all have some."""
     told = {file: one for file, one in found.items() if one is not None}
     if len(told) < len(found) or not told:
         return None

@@ -18,17 +18,17 @@ WORD = re.compile(r"[^\W_]+")
 CAMEL = re.compile(r"(?<=[a-zà-ÿ0-9])(?=[A-ZÀ-Þ][a-zà-ÿ])|(?<=[a-zà-ÿ])(?=[A-ZÀ-Þ])")
 PART = re.compile(r"\[(\d{1,9})\]")
 TWICE = "Give every column its own name, or choose columns by number with --map, 1 for the first."
-MANY = 12  # names said in one line
+MANY = 12  # most names in one line
 EVEN = 0.01  # of the step; a column whose steps differ by less is a clock
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """name: as the file has it; unit: as the file says, "" for nothing; values: (n,), not a number where there is none; words: text instead.
+    """name: in the file; unit: in the file, "" for none; values: (n,), NaN where there is none; words: text instead of numbers.
 
-    clock:  (n,) s, the instants of these values where the column has a time of its own
-    starts: rows at which a stretch begins that does not follow the one before
-    full:   its name with those of its structs or groups, where ``name`` is without them
+    clock:  (n,) s, the instants of these values if the column has its own time
+    starts: first rows of stretches that do not continue the one before
+    full:   the name with those of its structs or groups, if ``name`` is without them
     """
 
     name: str
@@ -41,7 +41,7 @@ class Column:
 
     @property
     def step(self) -> float:
-        """By which the numbers rise evenly from row to row, as those of a clock do; 0 if they do not."""
+        """The even step by which the numbers rise from row to row, as of a clock; 0 if they do not."""
         finite = self.values[np.isfinite(self.values)]
         steps = np.diff(finite)
         step = float(np.median(steps)) if steps.size > 1 else 0.0
@@ -52,9 +52,9 @@ class Column:
 class Sheet:
     """The columns of one file.
 
-    fs: Hz, if the file says it; kind: what the file calls a column; notes: what was odd
-    arrays: of the contract's names (u, y, t, ...), where the file has them
-    bad: what stands in a cell that is no number, by column: said when the column is to be used
+    fs: Hz, if the file has it; kind: word for a column of such a file; notes: irregularities
+    arrays: with the contract's names (u, y, t, ...), if the file has them
+    bad: the first cell that is not a number, by column: reported when the column is used
     """
 
     path: Path
@@ -66,12 +66,12 @@ class Sheet:
     arrays: Mapping[str, NDArray[Any]] | None = None
 
     def names(self) -> str:
-        """For people: the columns there are."""
+        """A text with the names of the columns."""
         shown = [column.name for column in self.columns]
         return "it has " + (", ".join(shown[:MANY]) + (f" and {len(shown) - MANY} more" if len(shown) > MANY else "") or "nothing")
 
     def find(self, name: str) -> Column:
-        """The column of that name, in this spelling or another (case, blanks, signs), or of that number (1 is the first)."""
+        """The column of this name, in any spelling (case, blanks, signs), or of this number (1 is the first). Raises BadRecording."""
         for same in (lambda one: one == name, lambda one: one.casefold() == name.casefold(), lambda one: spoken(one) == spoken(name) != ()):
             found = [column for column in self.columns if same(column.name) or (column.full and same(column.full))]
             if len(found) > 1:
@@ -87,7 +87,7 @@ class Sheet:
         raise BadRecording(self.path, f"no {self.kind} {name!r}; {self.names()}", "See xy-sysid columns FILE.")
 
     def _part(self, name: str) -> Column | None:
-        """One stretch of a column of several: data[2].speed is the third (they count from 0) of data[*].speed."""
+        """One stretch of a column of several: data[2].speed is the third of data[*].speed."""
         which = PART.search(name)
         whole = next((column for column in self.columns if which and column.starts and column.name == PART.sub("[*]", name, count=1)), None)
         if which is None or whole is None or int(which[1]) >= len(whole.starts):
@@ -97,7 +97,7 @@ class Sheet:
         return replace(whole, name=name, values=whole.values[rows], words=whole.words[rows], starts=())
 
     def usable(self, column: Column) -> Column:
-        """The column; raises BadRecording if it holds something that is not a number, or if another has its name."""
+        """The column; raises BadRecording if a cell is not a number, or if another column has its name."""
         if sum(other.name == column.name for other in self.columns) > 1:
             raise BadRecording(self.path, f"row 1: the {self.kind} {column.name!r} is there twice", TWICE)
         return self._numeric(column)
@@ -109,5 +109,5 @@ class Sheet:
 
 
 def spoken(name: str) -> tuple[str, ...]:
-    """The words of a name, small: "Motor_Voltage", "motorVoltage" and "MOTOR VOLTAGE" are one."""
+    """The words of a name, in lower case: those of "Motor_Voltage", "motorVoltage" and "MOTOR VOLTAGE" are equal."""
     return tuple(word.casefold() for part in CAMEL.split(name) for word in WORD.findall(part))

@@ -1,4 +1,4 @@
-"""A sheet, with its roles --> Table: instants in seconds, values in SI, a column for each joint."""
+"""A sheet with roles --> Table: instants in seconds, values in SI, a column for each joint."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from xy_sysid.imports.table import ONE_UNIT, Table, as_they_stand, places_of
 from xy_sysid.samples.block import FloatArray
 
 MEASURED = {"measured", "meas", "actual", "act", "feedback", "fb", "ist"}  # words of an input that was read, not commanded
-JOINTS = 64  # more names than that are no joints
+JOINTS = 64  # most joints; more names are something else
 
 
 def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
-    """What the sheet says about a recording; raises BadRecording that names the columns there are."""
+    """The table of a sheet. Raises BadRecording, which names the existing columns."""
     notes += sheet.notes
     roles = assigned(sheet, reading, notes)
     if roles.joint is not None:
         roles = _by_joint(sheet, roles, notes)
     every = tuple(axis for axis in roles.inputs if axis in roles.outputs)
-    roles = roles.of([every[place] for place in places_of(every, reading.axes)])  # of those that are left out nothing matters
+    roles = roles.of([every[place] for place in places_of(every, reading.axes)])  # axes that are left out need not be readable
     roles, time, fs = _in_time(sheet, roles, reading, notes)
     axes = tuple(roles.outputs)
     u, input_unit = _values(sheet, "input", roles.inputs, axes, reading, notes)
@@ -60,7 +60,7 @@ def table(sheet: Sheet, reading: Reading, notes: list[str]) -> Table:
 
 
 def _starts(path: Path, roles: Roles, axes: tuple[str, ...]) -> tuple[int, ...]:
-    """Rows at which a stretch begins, the same of all columns. Raises BadRecording where they differ."""
+    """First rows of stretches, the same in all columns. Raises BadRecording if they differ."""
     columns = [side[axis] for _, side in roles.sides() for axis in axes if axis in side]
     for column in columns[1:]:
         if column.starts != columns[0].starts:
@@ -70,7 +70,7 @@ def _starts(path: Path, roles: Roles, axes: tuple[str, ...]) -> tuple[int, ...]:
 
 
 def same_unit(reading: Reading, unit: Unit, output: Unit, notes: list[str]) -> bool:
-    """Whether a reference is measured like the output; if not it is left out, with a note. Raises BadInput if its unit was given."""
+    """Whether a reference has the unit of the output; if not, a note says that it is left out. Raises BadInput if its unit was given."""
     if unit.name == output.name:
         return True
     given = next((f"{what}={text}" for what, text in reading.units.items() if what.endswith("reference")), "")
@@ -81,7 +81,7 @@ def same_unit(reading: Reading, unit: Unit, output: Unit, notes: list[str]) -> b
 
 
 def _in_time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tuple[Roles, FloatArray | None, float | None]:
-    """The roles with a value of each column at every instant, and the instants in s, or None with the rate."""
+    """The roles with a value of each column at every instant, and the instants, s, or None with the rate, Hz."""
     if clocked(roles):
         roles, clock = on_one_clock(sheet.path, roles, notes)
         if reading.rate is None:
@@ -97,7 +97,7 @@ def _in_time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> 
 
 
 def _time(sheet: Sheet, roles: Roles, reading: Reading, notes: list[str]) -> tuple[FloatArray | None, float | None]:
-    """Instants in s, or None with the rate."""
+    """Instants, s, or None with the rate, Hz."""
     if reading.rate is not None:
         notes += as_they_stand(reading.rate, None if roles.time is None else roles.time.name)
         return None, reading.rate
@@ -143,7 +143,7 @@ def _values(sheet: Sheet, role: str, columns: Found, axes: tuple[str, ...], read
 
 
 def scaled(values: FloatArray, text: str, scale: float | None, what: str, notes: list[str]) -> tuple[FloatArray, str]:
-    """Values times a factor, and the unit they then have: counts and unknown units become SI."""
+    """Values times a factor, and their new unit: counts and unknown units become SI."""
     if scale is None:
         return values, text
     unit = unit_of(text)
@@ -166,7 +166,7 @@ def _usual(column: Column, role: str) -> str:
 
 
 def _taken(roles: Roles, axes: tuple[str, ...], units: Mapping[str, Unit]) -> str:
-    """What was understood, for people to check."""
+    """A note on the guessed roles, for the user to check."""
     said = [] if roles.time is None else [f"time = {roles.time.name!r}"]
     for axis in axes:
         for role, columns in roles.sides():
@@ -176,7 +176,7 @@ def _taken(roles: Roles, axes: tuple[str, ...], units: Mapping[str, Unit]) -> st
 
 
 def _by_joint(sheet: Sheet, roles: Roles, notes: list[str]) -> Roles:
-    """A row for each joint at each instant --> a column for each joint; what a joint lacks is not a number."""
+    """A row for each joint at each instant --> a column for each joint, NaN where a joint has no row."""
     joint, time = roles.joint, roles.time
     assert joint is not None
     words = np.array(joint.words or [f"{value:g}" for value in joint.values.tolist()])

@@ -1,4 +1,4 @@
-"""Columns read from a file without sample numbers --> Recording: what CSV, NPZ and MAT have in common."""
+"""Columns read from a file --> Recording: the common part of CSV, NPZ, MAT and the like."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ ONE_UNIT = "Give all axes of one kind the same unit, or choose axes of one unit 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """What a file holds, in SI.
+    """The content of a file, in SI.
 
-    time: (n,) s, or None with ``fs`` in Hz; seq: (n,) sample numbers if the file has them; values (n, axes) each
-    measured: what ``output`` is; starts: rows at which a stretch begins that does not follow the one before
+    time: (n,) s, or None with ``fs`` in Hz; seq: (n,) sample numbers if the file has them; input, output, reference: (n, axes)
+    measured: quantity of ``output``; starts: first rows of stretches that do not continue the one before
     """
 
     axes: tuple[str, ...]
@@ -52,7 +52,7 @@ def axis_names(count: int) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Samples on their way: time (n,) s, seq (n,) as far as it is known, values (n, axes); stretch (n,) numbers the stretches."""
+    """Samples during the conversion: time (n,) s, seq (n,) so far, values (n, axes); stretch: (n,) number of the stretch."""
 
     time: FloatArray
     seq: FloatArray
@@ -62,20 +62,20 @@ class _Rows:
     stretch: FloatArray
 
     def only(self, rows: NDArray[np.bool_] | slice) -> _Rows:
-        """Some of them."""
+        """Some of the rows."""
         reference = None if self.reference is None else self.reference[rows]
         kept = {name: getattr(self, name)[rows] for name in ("time", "seq", "voltage", "position", "stretch")}
         return _Rows(**kept, reference=reference)
 
 
 def recording(path: Path, table: Table, reading: Reading, notes: list[str]) -> Recording:
-    """Check, number and cut; raises BadRecording or BadInput."""
+    """The requested part of a table, checked and numbered; raises BadRecording or BadInput."""
     result, first = uncut(path, table, reading, notes)
     return cut(result, first, reading.start, reading.stop)
 
 
 def uncut(path: Path, table: Table, reading: Reading, notes: list[str]) -> tuple[Recording, float]:
-    """Check and number; the whole recording, and the instant from which its parts count. Raises BadRecording or BadInput."""
+    """The whole table, checked and numbered, and the instant from which its parts count, s. Raises BadRecording or BadInput."""
     _same_length(path, table)
     time = _time(path, table)
     columns = _whole(path, table, places_of(table.axes, reading.axes), notes)
@@ -108,14 +108,14 @@ def _same_length(path: Path, table: Table) -> None:
 
 
 def as_they_stand(rate: float | None, unused: str | None) -> list[str]:
-    """The note on samples whose instants are not read. rate: Hz, None if it is not known; unused: name of a time that is there."""
+    """The note on samples whose instants are not read. rate: Hz, None if unknown; unused: name of the ignored time column."""
     if unused is not None:
         return [f"the samples are used as they are, {rate:g} Hz; the time {unused!r} is not used"]
     return [] if rate is None else [f"there is no time; fs = {rate:g} Hz is taken"]
 
 
 def _time(path: Path, table: Table) -> FloatArray:
-    """(n,) s of all rows; from the rate where no time is read."""
+    """(n,) s of all rows; from the rate if no time is read."""
     if table.time is not None:
         return table.time
     if table.fs is None or not (np.isfinite(table.fs) and table.fs > 0):
@@ -139,7 +139,7 @@ def _finite(path: Path, table: Table, columns: list[int], time: FloatArray, note
 
 
 def _unwrapped(table: Table, rows: _Rows, notes: list[str]) -> _Rows:
-    """An angle that is kept within a turn goes on where it leaps by one: between two samples of it nothing could be interpolated."""
+    """The rows with wrapped angles unwrapped, because a wrapped angle cannot be interpolated."""
     if table.measured != "position":
         return rows
     if table.output_unit != "rad":
@@ -156,7 +156,7 @@ def _unwrapped(table: Table, rows: _Rows, notes: list[str]) -> _Rows:
 
 
 def _stretches(table: Table, time: FloatArray) -> FloatArray:
-    """(n,) number of the stretch that each row belongs to: as the table says, or each time that the clock begins again."""
+    """(n,) number of each row's stretch: from the table, or a new one each time that the clock restarts."""
     begins = np.zeros(len(time))
     if table.starts:
         starts = np.array([start for start in table.starts[1:] if start < len(time)], dtype=np.int64)
@@ -167,7 +167,7 @@ def _stretches(table: Table, time: FloatArray) -> FloatArray:
 
 
 def _numbered(path: Path, table: Table, rows: _Rows, notes: list[str]) -> tuple[_Rows, float]:
-    """The rows by sample number, each once, and the rate in Hz."""
+    """The rows with sample numbers, each once, and the rate, Hz."""
     rate = 0.0
     if table.seq is None:
         stretches = int(rows.stretch[-1]) + 1
@@ -189,7 +189,7 @@ def _numbered(path: Path, table: Table, rows: _Rows, notes: list[str]) -> tuple[
 
 
 def _by_time(path: Path, rows: _Rows, notes: list[str]) -> tuple[_Rows, float]:
-    """Numbered by their instants; the time of a stretch that begins again goes on after the one before."""
+    """The rows numbered by their instants; the time of a stretch that restarts continues after the one before."""
     time, number = rows.time.copy(), rows.stretch
     period = float(np.median(np.diff(time)))
     for begin in np.flatnonzero(np.diff(number)) + 1:
@@ -204,7 +204,7 @@ def _by_time(path: Path, rows: _Rows, notes: list[str]) -> tuple[_Rows, float]:
 
 
 def _each_once(path: Path, table: Table, rows: _Rows, notes: list[str]) -> _Rows:
-    """Of samples with one number the first."""
+    """The first of the rows with the same number. Raises BadRecording if the file's own numbers decrease."""
     fresh = np.concatenate(([True], rows.seq[1:] > np.maximum.accumulate(rows.seq)[:-1]))
     if fresh.all():
         return rows
@@ -215,7 +215,7 @@ def _each_once(path: Path, table: Table, rows: _Rows, notes: list[str]) -> _Rows
 
 
 def _whole(path: Path, table: Table, columns: list[int], notes: list[str]) -> list[int]:
-    """The axes without those that have hardly any numbers, as long as others have."""
+    """The axes without those that have hardly any numbers, unless all are such."""
     empty = hollow(table.output) | hollow(table.input)
     left = [place for place in columns if empty[place]]
     if not left or len(left) == len(columns):
@@ -226,7 +226,7 @@ def _whole(path: Path, table: Table, columns: list[int], notes: list[str]) -> li
 
 
 def places_of(axes: tuple[str, ...], wanted: Sequence[str] | None) -> list[int]:
-    """Places of the axes that are wanted, all for None; raises BadInput for one that is not there."""
+    """Indices of the wanted axes, all for None; raises BadInput for an unknown axis."""
     if wanted is None:
         return list(range(len(axes)))
     unknown = [name for name in wanted if name not in axes]

@@ -1,4 +1,4 @@
-"""The table in a text file: its first row, the names of its columns, and the separator of its cells."""
+"""The table in a text file: its first row, column names and separator."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from xy_sysid.imports.foreign_units import unit_of
 from xy_sysid.imports.names import header
 
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "inf", "-inf")
-BLANKS = " "  # one or more, of any kind
-SEPARATORS = (";", "\t", ",", BLANKS)  # the first of those that part rows equally well
-PROBES = 7  # rows, spread over the file, that show how it is written
-LOOK = 200  # rows among which the table begins
-STEADY = 20  # rows that look alike: there it has begun
-REMARKS = ("#", "%", "//")  # signs with which a line begins that is no row
+BLANKS = " "  # one or more blanks of any kind
+SEPARATORS = (";", "\t", ",", BLANKS)  # of equally good separators the first is used
+PROBES = 7  # rows of the second half of the file that show its form
+LOOK = 200  # first rows, in which the table begins
+STEADY = 20  # rows of which more than half must look like data at the beginning of the table
+REMARKS = ("#", "%", "//")  # first signs of a line that is a remark
 WORD = re.compile(r'"[^"]*"|\S+')
 BRACKETS = "[](){}"
 Rows = list[tuple[int, str]]
@@ -28,7 +28,7 @@ Names = list[tuple[str, str]]  # with their units
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """separator: between cells; names: of the columns, numbers where the file has none; rows: numbers in the file and text, of data alone.
+    """separator: between cells; names: of the columns, numbers if the file has none; rows: row number and text of the data rows.
 
     stamped: the first two columns are the seconds and nanoseconds of a stamp
     """
@@ -40,7 +40,7 @@ class TextTable:
 
 
 def text_table(text: str, notes: list[str]) -> TextTable:
-    """The table of a text, and notes on what stands above it and how it is read; empty if there are no rows at all."""
+    """The table of a text; empty if there are no rows. Adds notes on skipped rows and on assumptions."""
     lines = text.splitlines()
     rows = list(enumerate(lines, 1))
     if not all(map(str.strip, lines)):
@@ -75,7 +75,7 @@ def text_table(text: str, notes: list[str]) -> TextTable:
 
 
 def cells_of(line: str, separator: str, width: int = 0) -> list[str]:
-    """The cells of a row; a separator within quotes belongs to its cell. width: how many are expected, where names may hold blanks."""
+    """The cells of a row; a separator within quotes belongs to its cell. width: expected number, if names may contain blanks."""
     if separator == BLANKS:
         cells = [cell.strip('"') for cell in WORD.findall(line)]
         apart = [cell.strip() for cell in re.split(r"\s{2,}|\t", line.strip())]
@@ -94,12 +94,12 @@ def cells_of(line: str, separator: str, width: int = 0) -> list[str]:
 
 
 def number_of(cell: str, separator: str) -> float:
-    """Its number, not a number where it says so; raises ValueError. The decimal sign may be a comma where that parts no cells."""
+    """The number of a cell, NaN for a missing value; raises ValueError. The decimal sign may be a comma unless commas separate cells."""
     return np.nan if cell.lower() in MISSING else float(cell.replace(",", ".") if separator != "," else cell)
 
 
 def is_number(cell: str, separator: str) -> bool:
-    """True if it is one, and finite."""
+    """True if a cell is a finite number."""
     try:
         return bool(np.isfinite(number_of(cell, separator)))
     except ValueError:
@@ -107,13 +107,13 @@ def is_number(cell: str, separator: str) -> bool:
 
 
 def _probes(rows: Rows) -> Rows:
-    """Some from the middle of the file on, but not its last, which may be cut."""
+    """Some rows from the second half, without the last one, which may be cut."""
     later = rows[len(rows) // 2 : -1] or rows[-1:]
     return [later[round(place)] for place in np.linspace(0, len(later) - 1, min(PROBES, len(later)))]
 
 
 def _separator(rows: Rows) -> str:
-    """What parts the rows into numbers with the fewest words among them; of words alone, what is oftenest in the first."""
+    """The separator that gives the most numbers and fewest words; if there are more words, the most frequent one in the first row."""
 
     def numbers(separator: str) -> int:
         parted = [cells_of(line, separator) for _, line in _probes(rows)]
@@ -128,7 +128,7 @@ def _separator(rows: Rows) -> str:
 
 
 def _beginning(rows: Rows, separator: str, width: int) -> int:
-    """Place of the row of names, or of the first of data if it has none: what stands above is no part of the table."""
+    """Index of the row of names, or of the first data row if there is none; rows above are no part of the table."""
     cells = [cells_of(line, separator, width) for _, line in rows[: LOOK + STEADY]]
     wide = [len(row) >= width for row in cells]
     probes = [row for row in (cells_of(line, separator) for _, line in _probes(rows)) if len(row) == width]
@@ -151,7 +151,7 @@ def _beginning(rows: Rows, separator: str, width: int) -> int:
 
 
 def _with_units(names: Names, rows: Rows, separator: str) -> tuple[Names, Rows]:
-    """Units from a row of their own below the names."""
+    """Names with units from a row below them, and the rows without it; unchanged if there is none."""
     cells = [cell.strip(BRACKETS) for cell in cells_of(rows[0][1], separator, len(names))][: len(names)] if rows else []
     if len(cells) < len(names) or not _are_units(cells, separator):
         return names, rows
@@ -159,12 +159,12 @@ def _with_units(names: Names, rows: Rows, separator: str) -> tuple[Names, Rows]:
 
 
 def _is_remark(line: str) -> bool:
-    """Whether it begins as one; a row of units may begin with %."""
+    """Whether a line is a remark, and not a row of units, which may begin with %."""
     return line.lstrip().startswith(REMARKS) and any(unit_of(cell).quantity == "unknown" for cell in re.split(r"[\s;,]+", line.strip()))
 
 
 def _are_units(cells: Sequence[str], separator: str) -> bool:
-    """Whether a row names units: more than half of its cells are known ones, and none is a number."""
+    """Whether a row holds units: more than half of its cells are known units, and none is a number."""
     texts = [cell.strip(BRACKETS) for cell in cells if cell]
     known = sum(unit_of(text).quantity != "unknown" for text in texts)
     return 2 * known > len(texts) and not any(is_number(text, separator) for text in texts)

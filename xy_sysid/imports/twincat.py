@@ -1,6 +1,6 @@
-"""TwinCAT 3 Scope export (.csv, tabs): blocks of header lines, then rows in which each channel, or group of channels, has a column of times.
+"""TwinCAT 3 Scope export (.csv, tabs): header lines, then rows in which each channel, or group of channels, has a column of times.
 
-Values are scaled as the Scope shows them. Source: Beckhoff, TE13xx TwinCAT 3 Scope View, "Export tool"; files of CagtayFabry/pytcs.
+Values have the scaling of the Scope. Source: Beckhoff, TE13xx TwinCAT 3 Scope View, "Export tool"; files of CagtayFabry/pytcs.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from xy_sysid.imports.foreign_units import unit_of
 from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.imports.text_table import number_of
 
-TIME = "SampleTime"  # the line below the names whose label gives the unit of the times
-LABELS = ("SymbolComment", "Data-Type", "Unit")  # of lines that a channel may have
+TIME = "SampleTime"  # label of the line that gives the unit of the times
+LABELS = ("SymbolComment", "Data-Type", "Unit")  # labels of other header lines of a channel
 
 
 def sheet(path: Path) -> Sheet:
-    """A column for each channel, with its own times from the start of the export on."""
+    """A column for each channel, with its own times since the start of the export."""
     lines = text_of(path).splitlines()
     top = next(place for place, line in enumerate(lines) if line.startswith(TIME))
     names = max(place for place in range(top) if lines[place].startswith("Name\t"))
@@ -46,14 +46,14 @@ def _label(header: dict[str, list[str]]) -> str:
 
 
 def _unit(header: dict[str, list[str]], place: int) -> str:
-    """V of "V (Voltage)", nothing of "(None)"."""
+    """V from "V (Voltage)", empty for "(None)"."""
     cells = header.get("Unit", [])
     text = cells[place] if place < len(cells) else ""
     return text.partition("(")[0].strip()
 
 
 def _table(rows: list[list[str]], width: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """(n, width) numbers; what is missing at the end of a row or blank is none."""
+    """(n, width) numbers; NaN for blank cells and those missing at the end of a row."""
     found = np.array([[_number(cell) for cell in row[:width]] + [np.nan] * (width - len(row)) for row in rows])
     found[~np.isfinite(found)] = np.nan
     return found

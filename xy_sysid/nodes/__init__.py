@@ -1,6 +1,6 @@
 """ROS 2 nodes: thin adapters around the core.
 
-Linear algebra runs in one thread: the same bits on every run, and no core is taken from the data path. Set before numpy is imported.
+Linear algebra runs in one thread, for identical results in every run and free cores for the data path. This is set before numpy is imported.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ AXES = "axes"
 
 
 def declare_axes(node: Node) -> tuple[str, ...]:
-    """The parameter ``axes``, x and y by default; raises BadInput if it is not a list of names."""
+    """The parameter ``axes``, x and y by default; raises BadInput if it is not a list of names with different topics."""
     axes = overrides(node).get(AXES, ["x", "y"])
     if not isinstance(axes, list) or not axes or not all(isinstance(axis, str) and axis for axis in axes):
         raise BadInput(f"node {node.get_name()}: parameter {AXES}", axes, 'a list of names like ["x", "y"]', "Change it and try again.")

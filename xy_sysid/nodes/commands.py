@@ -1,8 +1,8 @@
-"""The interface to a controller of ros2_control: one number per joint, on time, and joint states.
+"""The interface to a controller of ros2_control: periodic commands of one number per joint, and joint states.
 
-The controllers of the kind (forward_command_controller, effort_controllers, velocity_controllers, position_controllers) take a
-``std_msgs/Float64MultiArray`` of one number a joint in their own order, without a layout, and keep to the last one they got.
-Those that take trajectories are in ``trajectories``.
+These controllers (forward_command_controller, effort_controllers, velocity_controllers, position_controllers) take a
+``std_msgs/Float64MultiArray`` with one number for each joint in their own order, without a layout, and hold the last one.
+For controllers that take trajectories see ``trajectories``.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.joint_fields import joints_of
 from xy_sysid.settings import ExcitationSettings, given
 
-COMMAND_QOS = QoSProfile(depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)  # only the newest one counts
+COMMAND_QOS = QoSProfile(depth=1, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)  # only the newest command is used
 STATE_QOS = QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST)  # guards use only the newest one
 BLOCK_TOPICS = ("voltage", "position", "reference")  # last parts of the names of topics with blocks
-SLEEP = 0.0002  # s that a sleep may be late: the remaining time is waited for without sleep
+SLEEP = 0.0002  # s by which a sleep may be late: the last part of a wait is in shorter sleeps
 
 
 class Commands:
-    """The controller's topic, and the positions of the axes' joints as they come.
+    """The controller's topic, and the received positions of the axes' joints.
 
-    says: the type of its messages
+    says: the type of the controller's messages
     """
 
     says: Any = Float64MultiArray
@@ -44,7 +44,10 @@ class Commands:
     def __init__(
         self, node: LifecycleNode, settings: ExcitationSettings, on_positions: Callable[[float, FloatArray], None], complain: Callable[[str], None]
     ) -> None:
-        """on_positions: is called with the stamp, s, and (axes,) positions; complain: with a sentence. Raises BadInput for joints that do not fit."""
+        """on_positions: called with the stamp, s, and (axes,) positions; complain: called with a sentence.
+
+        Raises BadInput for joints that do not match the axes, or a topic name that is used for blocks.
+        """
         axes = tuple(settings.axes)
         if settings.command_topic.rpartition("/")[2] in BLOCK_TOPICS:
             raise BadInput(
@@ -57,14 +60,14 @@ class Commands:
             allowed = f"each joint once, with {', '.join(self._joints)} among them"
             raise BadInput("controller_joints", ", ".join(self._order), allowed, "Write them as controllers.yaml has them.")
         self._others = tuple(joint for joint in self._order if joint not in self._joints)
-        self._heard = False  # a joint of ours has been received
-        self._kept: dict[str, float] = {}  # for position commands: the other joints hold these
+        self._heard = False  # a joint of the axes has been received
+        self._kept: dict[str, float] = {}  # positions that the other joints hold
         self._on_positions, self._complain, self._holds = on_positions, complain, settings.holds
         self.publisher = node.create_publisher(self.says, settings.command_topic, COMMAND_QOS)
         self.states = Ear(node, JointState, settings.joint_topic, self._on_states, STATE_QOS)
 
     def send(self, drive: Drive, values: FloatArray, at: float) -> bool:
-        """Send the drive's newest values, (axes,) for ROS time ``at``, s; returns False, and sends nothing, while a number is unknown."""
+        """Send the drive's newest values (axes,) for ROS time ``at``, s; returns False and sends nothing if a value is unknown."""
         return self._send(values)
 
     def rest(self, drive: Drive) -> None:
@@ -109,12 +112,12 @@ class Commands:
                 self._kept.setdefault(joint, places[joint])
 
     def forget(self) -> None:
-        """Delete the positions of the other joints: they may differ at the next start."""
+        """Delete the positions of the other joints, which may differ at the next start."""
         self._kept.clear()
 
 
 class Beat:
-    """A thread that calls ``step(skipped)`` once per period of the steady clock; skipped: number of periods missed before."""
+    """A thread that calls ``step(skipped)`` once per period, s, of the steady clock; skipped: number of periods missed before."""
 
     def __init__(self, period: float, step: Callable[[int], None]) -> None:
         self.clock = Clock(period, time.monotonic())

@@ -33,13 +33,13 @@ __all__ = [
 NAMESPACE = "/xy"
 AnySettings = TypeVar("AnySettings", bound=Settings)
 
-# Ten seconds of 20-row blocks at 2 kHz: reader queues overflow silently, so they are longer than any stall.
+# Ten seconds of 20-row blocks at 2 kHz: queues overflow without an error, so they are longer than any stall.
 DATA_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
-STOP_TOPIC = "stop"  # std_msgs/Bool: true is zero volts now and no activate until false
-# Two subscriptions: one for messages latched before the node started, one for publishers without latching or reliability. The depth is that of all
-# publishers together: at a depth of 1 the false of one would hide the true of another.
+STOP_TOPIC = "stop"  # std_msgs/Bool; true: zero volts now, and no activate until false
+# Two subscriptions: one for messages latched before the node started, one for publishers without latching or reliability. All publishers share the
+# queue: at a depth of 1 the false of one would replace the true of another.
 STOP_HEARD = (
     QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL),
     QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
@@ -49,7 +49,7 @@ OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  #
 
 
 class WalledNode(Overridable):
-    """A node whose callbacks are protected against errors, and which has nothing to do before it ends."""
+    """A node whose callbacks are protected against errors, and which can end at once."""
 
     exit_code: int | None = None
 
@@ -88,7 +88,7 @@ class Parameters(Generic[AnySettings]):
         self._accept = accept
 
     def on_change(self, parameters: list[Parameter]) -> SetParametersResult:
-        """rclpy asks before it sets parameters."""
+        """rclpy calls this before it sets parameters."""
         known = {item.name for item in knobs(self.settings)}
         values = {parameter.name: parameter.value for parameter in parameters if parameter.name in known}
         try:
@@ -102,13 +102,13 @@ class Parameters(Generic[AnySettings]):
 
 
 def overrides(node: Node) -> dict[str, Any]:
-    """Parameters given on the command line or in a file, of a node made with automatically_declare_parameters_from_overrides."""
+    """Parameters from the command line or a file, for a node made with automatically_declare_parameters_from_overrides."""
     given = cast("dict[str, Parameter]", node.get_parameters_by_prefix(""))
     return {name: parameter.value for name, parameter in given.items() if not name.startswith(OF_ROS)}
 
 
 def settings_from_parameters(node: Node, cls: type[AnySettings]) -> AnySettings:
-    """The settings with the node's declared parameter values; raises BadInput if they are inconsistent."""
+    """The settings with the node's given parameter values; raises BadInput if they are inconsistent."""
     known = {item.name for item in knobs(cls())}
     return build(cls, {name: value for name, value in overrides(node).items() if name in known}, f"node {node.get_name()}")
 
@@ -120,11 +120,11 @@ def declare(
     also: Collection[str] = (),
     fixed: Collection[str] | None = (),
 ) -> Parameters[AnySettings]:
-    """Declare every setting with its type, meaning, unit and limits; apply the given values; follow changes.
+    """Declare every setting with its type, meaning, unit and limits, with the given values; the result follows changes.
 
     The node must be made with automatically_declare_parameters_from_overrides. also: names that the node declares itself;
-    fixed: those that never change while it runs, None for all of them; rclpy refuses them before it asks ``accept``.
-    Raises BadInput for an unknown name (with the nearest spelling) and for a value that is not allowed.
+    fixed: names that never change while it runs, None for all; rclpy refuses their changes before it calls ``accept``.
+    Raises BadInput for an unknown name (with the nearest spelling) or a value that is not allowed.
     """
     given = {name: value for name, value in overrides(node).items() if name not in also}
     axes = overrides(node).get("axes", list(AXES))
@@ -157,13 +157,13 @@ def describe(item: Knob, fixed: bool = False) -> ParameterDescriptor:
     unit = f" [{item.unit}]" if item.unit else ""
     descriptor = ParameterDescriptor(
         read_only=fixed,
-        dynamic_typing=isinstance(item.value, list),  # an empty list has no type of its own
+        dynamic_typing=isinstance(item.value, list),  # the type of an empty list is unknown
         description=item.meaning + unit,
         additional_constraints=f"one of {', '.join(item.choices)}" if item.choices else "",
     )
     if item.low is not None and item.high is not None:
         if isinstance(item.value, float):
-            low = math.nextafter(item.low, math.inf) if item.above else item.low  # a range of ROS has its ends
+            low = math.nextafter(item.low, math.inf) if item.above else item.low  # a range of ROS includes its ends
             high = math.nextafter(item.high, -math.inf) if item.below else item.high
             descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
         else:

@@ -1,6 +1,6 @@
 """Plain messages and blocks of samples to ROS 2 messages and back: one codec for Float64MultiArray, one for DiagnosticStatus.
 
-An array.array is copied as a block; a list would be checked number by number.
+An array.array is copied at once; a list would be checked number by number.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from xy_sysid.samples.block import Block, FloatArray, columns, pack, unpack
 
 @functools.lru_cache(maxsize=64)
 def _layout(labels: tuple[str, ...], sizes: tuple[int, ...]) -> MultiArrayLayout:
-    """Two dimensions are rows and columns; with more, each one describes a consecutive part of the data."""
+    """The layout: two dimensions are rows and columns; otherwise each one describes a consecutive part of the data."""
     strides = (sizes[0] * sizes[1], sizes[1]) if len(sizes) == 2 else sizes
     named = zip(labels, sizes, strides, strict=True)
     return MultiArrayLayout(dim=[MultiArrayDimension(label=label, size=size, stride=stride) for label, size, stride in named])
@@ -32,7 +32,7 @@ def _array(labels: tuple[str, ...], sizes: tuple[int, ...], data: FloatArray) ->
 
 
 def array_to_ros(message: ArrayMessage) -> Float64MultiArray:
-    """Labels, sizes and numbers of a Float64MultiArray."""
+    """The Float64MultiArray of a plain message."""
     return _array(message.labels, message.sizes, message.data)
 
 
@@ -56,18 +56,18 @@ def from_message(message: Float64MultiArray) -> Block:
 
 
 def statuses_to_ros(statuses: list[StatusMessage], stamp: Any, hardware: str = "") -> DiagnosticArray:
-    """One DiagnosticArray."""
+    """The DiagnosticArray of some statuses."""
     out = DiagnosticArray(status=[status_to_ros(item, hardware) for item in statuses])
     out.header.stamp = stamp
     return out
 
 
 def status_to_ros(item: StatusMessage, hardware: str = "") -> DiagnosticStatus:
-    """One DiagnosticStatus."""
+    """The DiagnosticStatus of a plain status."""
     values = [KeyValue(key=key, value=value) for key, value in item.values]
     return DiagnosticStatus(level=bytes([item.level]), name=item.name, message=item.message, hardware_id=hardware, values=values)
 
 
 def status(name: str, level: int, message: str, values: Mapping[str, str]) -> DiagnosticStatus:
-    """What a node says of itself, from level, sentence and named values."""
+    """The DiagnosticStatus of a node itself, from level, sentence and named values."""
     return status_to_ros(StatusMessage(name, level, message, tuple(values.items())), name)

@@ -44,14 +44,14 @@ LOOK, BEAT = 0.05, 0.5  # s between two checks, and between two statuses
 QUIET = 0.5  # s without a position after which no drive is active
 FOUND = 0.5  # s in which the machine finds a new source of voltage
 SILENT = 3.0  # s without an answer after which the path is cancelled
-SHOWN = 600  # rows of the table of errors at most
+SHOWN = 600  # approximate number of rows in the table of errors
 IDLE, STOPPING, DESIGNING, FOLLOWING, DONE, FAILED = "idle", "stopping the excitation", "designing", "following", "done", "failed"
 BUSY = (STOPPING, DESIGNING, FOLLOWING)
 MACHINE = "ballscrew"  # the node of the simulated machine
 
 
 class DemoFollowerNode(WalledNode):
-    """Stories in; on request voltage out, until the path is over."""
+    """Receives stories; on request publishes voltage until the path is complete."""
 
     def __init__(self) -> None:
         super().__init__("demo_follower")
@@ -84,7 +84,7 @@ class DemoFollowerNode(WalledNode):
     def _number(self, name: str) -> float:
         return float(self.get_parameter(name).value or 0.0)
 
-    # what is heard
+    # subscriptions
 
     def _on_story(self, axis: str, message: String) -> None:
         self._stories[axis] = json.loads(message.data)
@@ -103,10 +103,10 @@ class DemoFollowerNode(WalledNode):
             return
         self._send(block)
 
-    # what is done
+    # actions
 
     def _use(self) -> str:
-        """Start. Raises BadInput without a model, or during another action."""
+        """Start. Raises BadInput without a model or a simulated machine, while STOP is on, or during another action."""
         if self._state in BUSY:
             raise BadInput("demo_follower", self._state, "one path at a time", "Wait until it is over.")
         if self._stopped:
@@ -123,14 +123,14 @@ class DemoFollowerNode(WalledNode):
         self._state, self._words, self._errors, self._plans = STOPPING, "the excitation is stopped", {}, None
         if self._excitation.service_is_ready():
             request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
-            self._excitation.call_async(request)  # refused where it is at rest already
+            self._excitation.call_async(request)  # refused if it is already inactive
         rates = {axis: float(self._stories[axis]["sampling_rate"]) for axis in self._axes}
         floors = {axis: float(self._stories[axis]["model"]["noise_floor"]) for axis in self._axes}
         threading.Thread(target=self._design, args=(models, rates, floors), daemon=True).start()
         return "the controllers are being designed; then the path is followed three times"
 
     def _design(self, models: dict[str, Any], rates: dict[str, float], floors: dict[str, float]) -> None:
-        """Design in a separate thread, because it takes seconds. Reads parameters and stores a result."""
+        """Design the plans in a separate thread, because this takes seconds."""
         far, speed, acceleration, limit = (self._number(name) for name in PARAMETERS)
         bounds, places = Bounds(speed, acceleration, acceleration / JERK_TIME), (0.0, far, -far, 0.0)
         try:
@@ -143,7 +143,7 @@ class DemoFollowerNode(WalledNode):
 
     @property
     def _quiet(self) -> bool:
-        """True if no other node drives: the simulated machine publishes no positions."""
+        """True if no node drives: the simulated machine publishes no positions."""
         return time.monotonic() - self._heard > QUIET
 
     def _look(self) -> None:
@@ -171,7 +171,7 @@ class DemoFollowerNode(WalledNode):
         self._state, self._words, self._heard = FOLLOWING, "", time.monotonic()
 
     def _send(self, here: Block) -> None:
-        """Send the next block, from the newest readings, or end after the path."""
+        """Send the next block for the newest readings, or end after the path."""
         followers = list(self._followers.values())
         shown = here.values[:, [here.axes.index(axis) for axis in self._followers]]
         if all(item.over for item in followers):
@@ -188,7 +188,7 @@ class DemoFollowerNode(WalledNode):
         self._voltage.publish(to_message(Block(tuple(self._followers), seq, self._epoch + seq / self._rate, np.ascontiguousarray(values))))
 
     def _end(self, state: str, words: str) -> None:
-        """Send zero volts, and report the result."""
+        """Send zero volts, publish the tables, and report the result."""
         if self._voltage is not None:
             self._publish(np.zeros((BLOCK, len(self._followers))))
             self._voltage.wait_for_all_acked()
@@ -199,7 +199,7 @@ class DemoFollowerNode(WalledNode):
         self._report()
 
     def _measure(self, whole: bool = False) -> None:
-        """rms errors so far; whole: also the tables."""
+        """Update the rms errors; whole: publish the tables too."""
         for axis, follower in self._followers.items():
             found = follower.errors()
             self._errors[axis] = [float(np.sqrt(np.mean(item**2))) for item in found]
@@ -212,7 +212,7 @@ class DemoFollowerNode(WalledNode):
                 self._tables[axis].publish(array_to_ros(message))
 
     def _report(self) -> None:
-        """``metrics``: the current activity, and the errors so far."""
+        """Publish ``metrics``: the current activity, and the errors so far."""
         values, told = {"state": self._state}, self._words
         if self._state == FOLLOWING:
             self._measure()

@@ -1,6 +1,6 @@
 """Diagnoser node: receives voltage and position; on request it finds the missing effect, and the error after each added effect.
 
-A thin adapter: ``diagnoser.Diagnoser`` decides what to do, ``story_process`` does it in a separate process.
+A thin adapter: ``diagnoser.Diagnoser`` decides, ``story_process`` calculates in a separate process.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from xy_sysid.story.acts import Act
 from xy_sysid.story.document import document
 from xy_sysid.story.story import Story, allowed
 
-LOOK = 0.1  # s between two checks for news
+LOOK = 0.1  # s between two checks of the worker
 HEARTBEAT = 1.0  # s between two statuses in metrics
 ACTS: tuple[Act, ...] = ("begin", "diagnose", "renew", "add_next", "auto")  # services, for all axes and for each
 IDLE = "idle"
@@ -75,7 +75,7 @@ class DiagnoserNode(WalledNode):
         self._tell()
 
     def _serve(self, axes: tuple[str, ...], of: str = "") -> None:
-        """The services of all axes, or of one: ~/diagnose and ~/diagnose/x."""
+        """Create the services for all axes, or for one: ~/diagnose and ~/diagnose/x."""
         for act in ACTS:
             name = topic_of(act, of) if of else act
             self._triggers.append(LaterTrigger(self, f"~/{name}", functools.partial(self._diagnoser.ask, act, axes)))
@@ -121,7 +121,7 @@ class DiagnoserNode(WalledNode):
         self._stories[story.axis].publish(String(data=text))
 
     def _tell(self) -> None:
-        """``diagnosis``: every axis, and the current activity."""
+        """Publish ``diagnosis``: every axis, and the current activity."""
         diagnoser = self._diagnoser
         statuses = [
             diagnosis_status(diagnoser.stories[axis])
@@ -136,7 +136,7 @@ class DiagnoserNode(WalledNode):
         self._diagnosis.publish(statuses_to_ros(statuses, self.get_clock().now().to_msg(), "diagnoser"))
 
     def _beat(self) -> None:
-        """The status of the streams, once a second."""
+        """Publish the status of the streams, once a second."""
         hearing = self._diagnoser.hearing
         level, text = verdict(self._streams.heard(hearing.total, hearing.sentences, hearing.faults), "voltage and position are received")
         text = f"{text}; {hearing.seconds:.1f} s without a gap are kept"

@@ -16,7 +16,7 @@ WARN, STALE = DiagnosticStatus.WARN, DiagnosticStatus.STALE
 
 
 class Diagnostics:
-    """Publishes both."""
+    """Publishes on both topics."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -24,7 +24,7 @@ class Diagnostics:
         self._all = node.create_publisher(DiagnosticArray, GLOBAL, 10)
 
     def publish(self, statuses: Iterable[DiagnosticStatus]) -> None:
-        """The statuses, stamped now."""
+        """Publish the statuses, stamped now."""
         own = DiagnosticArray(status=list(statuses))
         own.header.stamp = self._node.get_clock().now().to_msg()
         self._own.publish(own)

@@ -1,4 +1,4 @@
-"""Client of the excitation's parameters and transitions; each request is answered, or refused with a reason."""
+"""Client of the excitation's parameters and transitions; raises BadInput without an answer, or with the reason of a refusal."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from rclpy.signals import SignalHandlerOptions
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import ExcitationSettings, build, knobs
 
-ANSWER = 10.0  # s to wait for an answer of the excitation,
-ASKED = 3  # times, while its node is present
-APPEARS = 60.0  # s to wait for the excitation node,
-SOON = 1.0  # s, if the user wants to stop: a running excitation must still receive the request
+ANSWER = 10.0  # s to wait for an answer of the excitation while its node is present
+ASKED = 3  # attempts
+APPEARS = 60.0  # s to wait for the excitation node
+SOON = 1.0  # s instead, if the user wants to stop: a running excitation must still receive the request
 NODE = "excitation"
 
 
 class ExcitationClient:
-    """A node of its own in the thread that calls it. ended: called often; true if the user wants to stop."""
+    """A separate node, in the thread that calls it. ended: called often; true if the user wants to stop."""
 
     def __init__(self, name: str, ended: Callable[[], bool], namespace: str) -> None:
         self._is_over = ended
@@ -47,7 +47,10 @@ class ExcitationClient:
             self._executor.spin_once(timeout_sec=0.01)
 
     def call(self, kind: Any, service: str, request: Any) -> Any:
-        """The answer; repeated if none arrives, because discovery loses answers while it is incomplete. A change of state is requested once."""
+        """The answer. A request is repeated if none arrives, because answers are lost during discovery, except for a change of state.
+
+        Raises BadInput without an answer.
+        """
         for _ in range(1 if kind is ChangeState else ASKED):
             answer = self._ask(kind, service, request)
             if answer is not None or self._is_over():

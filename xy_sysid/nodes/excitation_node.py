@@ -1,7 +1,7 @@
 """Lifecycle node that drives the axes: publishes ``voltage``, reads ``position``; or commands a controller and reads joint states.
 
-Nothing moves before ``activate``. Whatever ends it (deactivate, a guard, an error, Ctrl-C, SIGTERM), the last voltage
-published is zero, and it has arrived before the node goes. Pacing, guards and signals are pure and live elsewhere.
+Nothing moves before ``activate``. After every end (deactivate, a guard, an error, Ctrl-C, SIGTERM) the last published voltage is
+zero, and the node ends after it was acknowledged. Pacing, guards and signals are pure logic in other modules.
 """
 
 from __future__ import annotations
@@ -41,21 +41,21 @@ from xy_sysid.processes.terminal import printable
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings, for_axes, knobs
 
-ARRIVES = Duration(seconds=1.0)  # how long the last zero may take to be acknowledged
-SAME_EPOCH = 0.05  # s by which the ROS time of counter 0 may move over a pause before the stamps follow it
-SETTLED = 0.5  # s without a new listener before starting by itself: whoever was started together hears the first sample
-SAME_NODE = 2.0  # s to look for one node that reads voltage and writes position, before any two will do
+ARRIVES = Duration(seconds=1.0)  # longest wait for the acknowledgement of the last zero
+SAME_EPOCH = 0.05  # s by which the ROS time of counter 0 may change in a pause before the stamps follow it
+SETTLED = 0.5  # s without a new subscriber before the automatic start, so that nodes started together receive the first sample
+SAME_NODE = 2.0  # s to wait for one node that reads voltage and writes position; then two nodes suffice
 ALONE = 0.1  # s between two checks for another node that drives
-KNOCK = 1.0  # s after which zeros go out once more in lockstep, while no machine has answered yet
-STOP_LOOK = 0.02  # s between two looks whether STOP was asked for
-FOUND = 1.0  # s after which a node has found all who were there before it
-INTRODUCES = 0.5  # s in which a node that is seen becomes known by its name
+KNOCK = 1.0  # s after which zeros are sent again in lockstep while no machine has answered
+STOP_LOOK = 0.02  # s between two checks of STOP
+FOUND = 1.0  # s after which a node has discovered all nodes that existed before it
+INTRODUCES = 0.5  # s after which the name of a discovered node is known
 KILLED = "A node that was killed is forgotten after 20 s."
 
-FIXED = ("output", "interface", "command", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # when the node starts
-LAST = 5  # times that the last command is sent: a controller listens with best effort
-FOLLOW = 0.01  # part by which the stamps of commands follow the ROS clock with every one, so that two clocks do not drift apart
-FOLLOW_MOTION = 0.0001  # the same for trajectories, whose motion lies along the stamps
+FIXED = ("output", "interface", "command", "unit", "command_topic", "controller_joints", "joint_topic", "joints")  # set when the node starts
+LAST = 5  # repetitions of the last command: a controller subscribes with best effort
+FOLLOW = 0.01  # fraction by which the stamp of each command is corrected towards the ROS clock, so that the clocks do not drift apart
+FOLLOW_MOTION = 0.0001  # the same for trajectories, whose motion follows the stamps
 
 
 class ExcitationNode(Overridable, LifecycleNode):
@@ -76,24 +76,24 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._blocks = 0  # sent since activation
         self._first = 0  # counter of the first sample since activation
         self._epoch: float | None = None  # s, ROS time of the sample with counter 0
-        self._until: float | None = None  # when the last block sent is over
-        self._loud = False  # the last block published was not all zeros
+        self._until: float | None = None  # s, steady time at which the last sent block ends
+        self._loud = False  # the last published block was not all zeros
         self._complaint = ""
-        self._stop_told = ""  # whose STOP was said to be on
-        self._unnamed = 0.0  # s since which another one is there without a name
+        self._stop_told = ""  # the last logged sentence on STOP
+        self._unnamed = 0.0  # s for which another publisher has been present without a name
         self._refused = ""  # why the last transition was refused
         self._refusals, self._recent = 0, Recent()
         self._made = time.monotonic()
         self._wall = Wall(self._complain)
-        for service in self._services:  # rclpy's own: a transition that the state does not have would end the node
+        for service in self._services:  # rclpy's own: a transition that is not possible in this state would end the node
             service.callback = self._wall.around(service.callback)
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)  # guards must not sleep when the clock is stopped or set
         self._voltage = self.create_publisher(Float64MultiArray, "voltage", DATA_QOS)
         self._metrics = Diagnostics(self)
         self._reference = self.create_publisher(Float64MultiArray, "reference", DATA_QOS) if self._knobs.settings.interface != "effort" else None
-        self._hold = threading.RLock()  # of the drive, where a thread of its own sends commands
+        self._hold = threading.RLock()  # of the drive, if a separate thread sends commands
         self._beat: Beat | None = None
-        self._rows: list[tuple[float, float, FloatArray]] = []  # seq, time and values of commands that no block holds yet
+        self._rows: list[tuple[float, float, FloatArray]] = []  # seq, time and values of commands not yet published as a block
         commanding = {"forward": Commands, "joint_trajectory": Trajectories}[self._knobs.settings.command]
         on_commands = self._knobs.settings.output == "commands"
         self._commands = commanding(self, self._knobs.settings, self._on_joints, self._complain) if on_commands else None
@@ -104,7 +104,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self.create_timer(0.5, self._report, clock=self._steady)
         self.create_timer(ALONE, self._look_for_another, clock=self._steady)
         self._autostart: Timer | None = None
-        self._waiting_since, self._readers, self._settled_at = 0.0, 0, 0.0  # how many read the voltage, and when their number will have settled
+        self._waiting_since, self._readers, self._settled_at = 0.0, 0, 0.0  # readers of the voltage, and when their number is settled
         if self._knobs.settings.autostart:
             self._wait_for_machine()
         self.get_logger().info(
@@ -129,7 +129,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return super().on_configure(state)
 
     def _take_experiment(self) -> Starts:
-        """Set what the file of a designed experiment asks for; where it may begin. Raises BadInput for one that asks for more than the own limits."""
+        """Set the parameters from the file of a designed experiment; returns where it may begin. Raises BadInput if it exceeds the node's limits."""
         settings = self._knobs.settings
         if not settings.experiment:
             return {}
@@ -177,7 +177,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return super().on_activate(state)
 
     def _refuse(self, why: str) -> TransitionCallbackReturn:
-        """Say why a transition is not made, in the log and for some seconds in the status."""
+        """Report why a transition is refused, in the log and for some seconds in the status."""
         self._refused, self._refusals = why, self._refusals + 1
         self.get_logger().error(why)
         self._report()
@@ -189,7 +189,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Nothing to give back."""
+        """Nothing to release."""
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -211,7 +211,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             self._report()
 
     def _obey_stop(self) -> bool:
-        """Take what the topic says, and begin to fade out; whether STOP has come on."""
+        """Read the topic STOP, and begin to fade out if it is on; returns whether it was switched on."""
         if self._stop.listen():
             if self._stop.held and self._drive is not None and not self.has_stopped():
                 with self._hold:
@@ -230,7 +230,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return str(self._commands.publisher.topic_name if self._commands else self._voltage.topic_name)
 
     def _no_blocks(self) -> str:
-        """Why no blocks may be sent: whoever takes them for commands would take a counter for an effort. Empty if all is well."""
+        """Why no blocks may be sent: a controller would read their counter as an effort. Empty if they may be sent."""
         topic = self._way
         if self._knobs.settings.renamed:
             return ""
@@ -251,7 +251,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return ""
 
     def _no_commands(self, commands: Commands) -> str:
-        """Why no trajectories may be sent: no node receives them. Empty if one does, and with a forward controller."""
+        """Why no trajectories may be sent: no node receives them. Empty if one does, or for a forward controller."""
         if not isinstance(commands, Trajectories):
             return ""
         kinds = {info.topic_type for info in self.get_subscriptions_info_by_topic(self._way)}
@@ -264,7 +264,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         )
 
     def _others(self) -> list[str]:
-        """Who else drives the machine."""
+        """Names of the other nodes that drive the machine."""
         topic = self._way
         if self.count_publishers(topic) <= 1:
             return []
@@ -275,7 +275,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         return sorted(set(names))
 
     def _rivals(self) -> str:
-        """Which other node drives the machine or has this node's name, in words; empty if none."""
+        """A sentence on another node that drives the machine or has this node's name; empty if there is none."""
         others = self._others()
         if others:
             return f"{' and '.join(others)} publishes {self._way}, too"
@@ -306,11 +306,11 @@ class ExcitationNode(Overridable, LifecycleNode):
                 self._drive.stop(reason, self._drive.settings.ramp)
 
     def has_stopped(self) -> bool:
-        """The last block published is zeros."""
+        """True if the last published block is zeros."""
         return self._drive is None or self._drive.state in ("idle", "stopped")
 
     def last_words(self) -> None:
-        """Zero volts, even if the drive itself is what failed."""
+        """Zero volts, even if the drive itself has failed."""
         try:
             self._finish("ended")
         finally:
@@ -325,7 +325,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         super().destroy_node()
 
     def _finish(self, reason: str) -> None:
-        """Fade out without waiting for positions, at the pace of the machine, and see the zeros arrive."""
+        """Fade out without waiting for positions, in real time unless in lockstep, and wait until the zeros are acknowledged."""
         if self._pace is not None:
             self.destroy_timer(self._pace)
             self._pace = None
@@ -341,12 +341,12 @@ class ExcitationNode(Overridable, LifecycleNode):
             self._obey_stop()
             self._send(drive)
             time.sleep(0.0 if drive.settings.lockstep else self._pacer.period)
-        self._report()  # whoever waits for the end need not wait for the acknowledgements
+        self._report()  # the end is reported before the acknowledgements
         if was_running or self._loud:
             self._voltage.wait_for_all_acked(ARRIVES)
 
     def _finish_commands(self, drive: Drive, beat: Beat, reason: str) -> None:
-        """The thread fades out; then what is safe, several times, and see it arrive."""
+        """Wait while the thread fades out; then send the safe output several times, and wait until it is acknowledged."""
         assert self._commands is not None
         with self._hold:
             drive.stop(reason, drive.settings.abort_ramp)
@@ -378,7 +378,7 @@ class ExcitationNode(Overridable, LifecycleNode):
                 self._complain(f"joint states: not usable ({drive.unusable})")
 
     def _on_beat(self, skipped: int) -> None:
-        """In the thread: one command, on time; after an error what is safe, and the end."""
+        """Send one command, in the thread; after an error send the safe output, and end."""
         drive, commands, before = self._drive, self._commands, self._wall.count
         if drive is None or commands is None:
             return
@@ -400,18 +400,18 @@ class ExcitationNode(Overridable, LifecycleNode):
                 self._beat.close()
 
     def _stamp(self, seq: float) -> float:
-        """ROS time of a command, s: even, and never far from the clock."""
+        """ROS time of a command, s: evenly spaced, and close to the clock."""
         assert self._drive is not None and self._epoch is not None
         count = seq / self._drive.settings.rate
         apart = self.get_clock().now().nanoseconds * 1e-9 - count - self._epoch
-        if isinstance(self._commands, Trajectories):  # a jump of the stamps would be one of the motion
+        if isinstance(self._commands, Trajectories):  # a jump of the stamps would be a jump of the motion
             self._epoch += FOLLOW_MOTION * apart
         else:
             self._epoch += apart if abs(apart) > SAME_EPOCH else FOLLOW * apart
         return self._epoch + count
 
     def _publish_rows(self) -> None:
-        """What was commanded, as a block, for whoever identifies or records."""
+        """Publish the sent commands as a block, for identification and recording."""
         if self._rows and self._drive is not None:
             seq, time_, values = zip(*self._rows, strict=True)
             message = to_message(Block(self._drive.axes, np.array(seq), np.array(time_), np.array(values)))
@@ -449,7 +449,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         drive.tick(now)
         if drive.settings.lockstep:
             if not drive.answered and self._until is not None and now > self._until + KNOCK and drive.state == "active":
-                self._send(drive)  # one of the two had not found the other yet when the last one went out
+                self._send(drive)  # discovery was not complete when the last block was sent
             self._in_lockstep(drive)
             return
         drive.skip(self._pacer.skip(now) * drive.settings.block)
@@ -458,7 +458,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._after(drive)
 
     def _in_lockstep(self, drive: Drive) -> None:
-        """Block k goes out as soon as it is due and the positions of block k - ahead are there, and knows no later ones."""
+        """Send block k as soon as it is due and the positions of block k - ahead have arrived; it depends on no later positions."""
         settings, now = drive.settings, time.monotonic()
         while drive.state != "stopped" and self._pacer.due(now) > 0:
             if self._blocks >= settings.ahead and not drive.blind:
@@ -482,7 +482,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._voltage.publish(to_message(Block(block.axes, block.seq, block.time + (self._epoch or 0.0), block.values)))
 
     def _after(self, drive: Drive) -> None:
-        """Go inactive when the drive has come to its end by itself, and say why."""
+        """Deactivate if the drive has ended by itself, and log the reason."""
         if drive.state == "stopped" and self._pace is not None:
             (self.get_logger().error if drive.fault else self.get_logger().info)(f"inactive: {drive.reason}")
             self.trigger_deactivate()
@@ -502,7 +502,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             self._drive.change(settings)
 
     def _complain(self, text: str) -> None:
-        """The same complaint once, whatever its numbers."""
+        """Log a complaint, but not again if only its numbers differ."""
         kind = re.sub(r"[\d.]+", "", text)
         if kind != self._complaint:
             self._complaint = kind
@@ -524,7 +524,7 @@ class ExcitationNode(Overridable, LifecycleNode):
                 values[f"{axis}.braked"] = f"{report.braked[number]:.0f}"
         refused = self._recent.goes_on("refused", self._refusals, time.monotonic())
         stop = self._stop.why() if self._stop.held else ""
-        if stop and stop != self._stop_told:  # again when the name of its sender is found, which may come after the message
+        if stop and stop != self._stop_told:  # again when the name of the sender becomes known, which may be after the message
             self.get_logger().warning(stop)
         self._stop_told = stop
         if stop or (refused and (drive is None or drive.state != "active")):
@@ -540,7 +540,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._autostart = self.create_timer(0.1, self._start_by_itself, clock=self._steady)
 
     def _start_by_itself(self) -> None:
-        """Configure and activate once a machine is there: one node that reads voltage and writes position."""
+        """Configure and activate as soon as a machine is present: one node that reads voltage and writes position."""
         if self.count_subscribers(self._way) == 0 or self._position.get_publisher_count() == 0:
             if time.monotonic() - self._waiting_since > self._knobs.settings.patience:
                 self._complain(f"no machine yet: no node reads {self._way} and writes {self._position.topic_name}")

@@ -1,6 +1,6 @@
-"""Conducts the first run: the excitation drives, with all its guards; this node asks it for each push and hears what came of it.
+"""Conducts the first run: the excitation drives, with all its guards; this node requests each push and receives voltage and position.
 
-``excitation.first_run`` decides; here are only time, topics and services.
+``excitation.first_run`` decides; this module has only time, topics and services.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from xy_sysid.nodes.wall import Wall
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import ExcitationSettings
 
-TRIES = 5  # of a push whose messages did not all come
-REST, FORTH = 0.12, 0.15  # s at 0 V before, between and after, and s of each push
+TRIES = 5  # attempts of a push whose messages do not all arrive
+REST, FORTH = 0.12, 0.15  # s at 0 V before, between and after pushes, and s of each push
 
 
 class Conductor(ExcitationClient):
-    """``run`` does it all; it returns when the machine stands. ended: called often; true if the user wants to stop."""
+    """``run`` conducts the first run, and returns when the machine stands. ended: called often; true if the user wants to stop."""
 
     def __init__(self, say: Callable[[str], None], ended: Callable[[], bool], namespace: str = NAMESPACE) -> None:
         self.found: dict[str, AxisFound] = {}
@@ -37,13 +37,13 @@ class Conductor(ExcitationClient):
         self._say = say
         self._blocks: dict[str, dict[float, Block]] = {"voltage": {}, "position": {}}
         self._reason = ""
-        self._wall = wall = Wall(lambda words: None, "ended by an error of its own, please report it")  # told as the problem
+        self._wall = wall = Wall(lambda words: None, "ended by an error of its own, please report it")  # reported as the problem
         for topic in self._blocks:
             Ear(self._node, Float64MultiArray, topic, wall.around(self._keeper(topic)), DATA_QOS)
         self._node.create_subscription(DiagnosticArray, "metrics", wall.around(self._on_statuses), 100)
 
     def run(self) -> bool:
-        """Whether all was well; ``problem`` says what was not, ``found`` what is known."""
+        """True if there was no problem; ``problem`` is a sentence on it, ``found`` the results by axis."""
         with self._wall:
             try:
                 self._conduct()
@@ -69,7 +69,7 @@ class Conductor(ExcitationClient):
         try:
             while not self._over() and (push := first.next()) is not None:
                 samples = self._push(push, settings)
-                if self._over():  # part of a push says nothing of the machine
+                if self._over():  # part of a push shows nothing about the machine
                     break
                 self._say(first.took(*samples).sentence)
             self.problem = self.problem or (f"the excitation stopped: {self._reason}" if self._reason else first.problem)
@@ -81,7 +81,7 @@ class Conductor(ExcitationClient):
                 self._say(first.summary(axis))
 
     def _rest(self) -> None:
-        """Deactivate; what goes wrong with that is told beside what has ended the run, and the nodes are ended anyway."""
+        """Deactivate; a failure is reported unless another problem is."""
         try:
             if self.state() == "active":
                 self.transition("deactivate")
@@ -89,7 +89,7 @@ class Conductor(ExcitationClient):
             self.problem = self.problem or str(problem)
 
     def _push(self, push: Push, settings: ExcitationSettings) -> tuple[FloatArray, FloatArray]:
-        """Voltage and position of a push; again where the messages of one did not all come, as on a busy machine."""
+        """(n, axes) voltage and position of a push, which is repeated if messages are missing, as on a busy machine. Raises BadInput."""
         column = tuple(settings.axes).index(push.axis)
         for _ in range(TRIES):
             voltage, position, whole = self._pushed(push, settings)
@@ -99,8 +99,8 @@ class Conductor(ExcitationClient):
         raise BadInput(what, value, "streams without a gap", "Run fewer other programs on this computer, or check the network.")
 
     def _pushed(self, push: Push, settings: ExcitationSettings) -> tuple[FloatArray, FloatArray, bool]:
-        """Voltage and position of rest, forth, rest, back, rest, and whether they are without a gap."""
-        self.set({f"{push.axis}.breakaway": push.volts})  # friction is what is looked for: it is no fault up to here
+        """(n, axes) voltage and position of rest, forth, rest, back, rest, and whether they have no gap."""
+        self.set({f"{push.axis}.breakaway": push.volts})  # friction is searched for: up to this voltage it is no fault
         for blocks in self._blocks.values():
             blocks.clear()
         self.wait(REST)
@@ -123,7 +123,7 @@ class Conductor(ExcitationClient):
             self.problem = self.problem or self._wall.told
         return bool(self.problem or self._reason)
 
-    # what is heard
+    # subscriptions
 
     def _keeper(self, topic: str) -> Callable[[Float64MultiArray], None]:
         def keep(message: Float64MultiArray) -> None:
@@ -138,10 +138,10 @@ class Conductor(ExcitationClient):
             if status.name == NODE and status.level == b"\x02":
                 self._reason = status.message
 
-    # what is asked for
+    # waiting
 
     def _heard(self, samples: float) -> None:
-        """Until both streams have brought so many since the last push; what does not come in time is said by the push itself."""
+        """Wait until both streams have this many samples since the last push, or until a timeout."""
         until = time.monotonic() + ANSWER
         while min(sum(len(block) for block in blocks.values()) for blocks in self._blocks.values()) < samples:
             if time.monotonic() > until or self._over():

@@ -1,7 +1,7 @@
-"""A subscription that hears every publisher: reliable as long as all of them are, best effort as soon as one is not.
+"""A subscription that receives from every publisher: reliable while all of them are reliable, otherwise best effort.
 
-A reliable subscription hears nothing at all of a best-effort publisher, as drivers of sensors often are; a best-effort
-one loses samples of ours, which come in bursts of thousands when a simulated machine runs as fast as it goes.
+A reliable subscription receives nothing from a best-effort publisher, such as many sensor drivers; a best-effort one loses
+samples of these nodes, which come in bursts of thousands when a simulated machine runs as fast as it can.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from xy_sysid.nodes.quality import overridden
 
-LOOK = 0.2  # s between two looks for a publisher that offers something else
+LOOK = 0.2  # s between two checks of the publishers' reliability
 
 
 class Ear:
-    """Subscribes, and subscribes again when what the publishers offer has changed."""
+    """Subscribes, and subscribes again when the reliability of the publishers has changed."""
 
     def __init__(self, node: Node, kind: Any, topic: str, callback: Callable[[Any], None], quality: QoSProfile) -> None:
         """quality: depth and history; the reliability is that of the publishers."""
         self._node, self._kind, self._callback, self._quality = node, kind, callback, quality
         self._reliable = True
-        self._told = "reliability" in overridden(node, topic, "subscription")  # by the user, who is not overruled
+        self._told = "reliability" in overridden(node, topic, "subscription")  # by the user, whose choice is kept
         self._subscription = self._subscribe(topic)
         self._topic = topic
         self._look()
@@ -34,11 +34,11 @@ class Ear:
 
     @property
     def topic_name(self) -> str:
-        """With its namespace."""
+        """Name of the topic with its namespace."""
         return str(self._subscription.topic_name)
 
     def get_publisher_count(self) -> int:
-        """How many are there, heard or not."""
+        """Number of publishers, compatible or not."""
         return self._node.count_publishers(self.topic_name)
 
     def _subscribe(self, topic: str) -> Any:

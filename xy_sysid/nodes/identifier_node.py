@@ -1,7 +1,7 @@
 """Identifier node: receives voltage and position; publishes frequency response, transfer function, comparison and metrics.
 
-Thin: the logic is ``identifier.Identifier`` on the data path and ``live_fit.LiveFitter`` in a thread of its own, so that
-data handling never waits for a fit.
+A thin adapter: the logic is ``identifier.Identifier`` on the data path and ``live_fit.LiveFitter`` in a separate thread, so
+data never wait for a fit.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from xy_sysid.processes.fit_thread import FitWorker
 from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.settings import IdentifierSettings
 
-PUBLISH_PERIOD = 0.05  # s between two looks for finished fits
+PUBLISH_PERIOD = 0.05  # s between two checks for finished fits
 HEARTBEAT = 1.0  # s between two statuses of the streams
-# Changing one of these restarts the spectra; the topics' names and types are fixed when the node starts.
+# A change of one of these restarts the spectra; names and types of topics are fixed when the node starts.
 SHAPES_SPECTRA = ("window", "length", "overlap", "differenced", "memory", "sliding", "alarm_windows", "reorder")
 FIXED = ("response", *HEARING, "state_file", "save_every", "baseline", "baseline_table")
 
@@ -60,7 +60,7 @@ class IdentifierNode(WalledNode):
         for topic in coupling_topics(self._axes):
             self._publisher(topic)
         self._resume()
-        warm_up(settings)  # before anything is subscribed to: compiling holds up the data path
+        warm_up(settings)  # before the subscriptions: compilation would block the data path
         self._streams = Streams(self, self._axes, settings, self._feed)
         for name, act in (("reset", self._reset), ("save", self._save), ("load", self._load)):
             self.create_service(Trigger, f"~/{name}", functools.partial(answered, act))
@@ -98,7 +98,7 @@ class IdentifierNode(WalledNode):
         self._metrics.publish(status_to_ros(item, "identifier") for item in self._since.statuses())
 
     def _beat(self) -> None:
-        """What is heard of the streams, once a second, whether or not there is anything to fit."""
+        """Publish the status of the streams, once a second, also without a fit."""
         recent, now = self._streams.recent, time.monotonic()
         heard = self._streams.heard(self._identifier.samples, self._identifier.sentences, self._identifier.faults)
         level, text = verdict(heard, f"{', '.join(heard.streams[:-1])} and {heard.streams[-1]} are received")
@@ -137,7 +137,7 @@ class IdentifierNode(WalledNode):
             self._worker.change(fitter)
 
     def _fitter(self, settings: IdentifierSettings) -> LiveFitter:
-        """A fitter that knows nothing yet, and what is compared with the baseline begins again."""
+        """A new fitter without data; the comparison with the baseline restarts too."""
         self._since.forget()
         return LiveFitter(settings, self._since.models)
 
@@ -167,7 +167,7 @@ class IdentifierNode(WalledNode):
         return self._state_path
 
     def _resume(self) -> None:
-        """Go on with the saved spectra, if there are any that fit."""
+        """Continue with the saved spectra, if there are any that match."""
         if self._state_path is None or not self._state_path.exists():
             return
         try:
@@ -183,7 +183,7 @@ class IdentifierNode(WalledNode):
             self.get_logger().error(f"the state could not be saved: {problem}", throttle_duration_sec=60.0)
 
     def last_words(self) -> None:
-        """Publish what is still to come, and save."""
+        """Publish the last fits, and save."""
         for update in self._worker.close():
             self._publish(update)
         if self._state_path is not None:

@@ -1,7 +1,7 @@
-"""A Trigger service that is answered when the work is done, without holding up the executor.
+"""A Trigger service that is answered when the work is done, without blocking the executor.
 
-rclpy's EventsExecutor calls a service's callback and sends what it returns; it knows no coroutines (7.1.6). So the
-response is caught where it would be sent, and sent later.
+rclpy's EventsExecutor calls a service's callback and sends its return value; it has no coroutines (7.1.6). So the
+response is intercepted when it would be sent, and sent later.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from xy_sysid.errors import XySysidError
 
 
 class LaterTrigger:
-    """``ask`` begins the work and gives its number; ``answer`` sends the response to all who wait for it."""
+    """``ask`` begins the work and returns its number; ``answer`` sends the response to all clients that wait for it."""
 
     def __init__(self, node: Node, name: str, ask: Callable[[], int]) -> None:
-        """ask: may raise XySysidError, which is answered at once."""
+        """ask: if it raises XySysidError, the service answers at once with that text."""
         self._ask = ask
         self._waiting: dict[int, list[tuple[Any, Any]]] = {}
         self._number: int | None = None
@@ -41,12 +41,12 @@ class LaterTrigger:
             self._waiting.setdefault(self._number, []).append((response, header))
 
     def answer(self, number: int, success: bool, text: str) -> None:
-        """Send the response to those who wait for this number."""
+        """Send the response to the clients that wait for this number."""
         for response, header in self._waiting.pop(number, []):
             response.success, response.message = success, text
             self._send(response, header)
 
     def give_up(self, text: str) -> None:
-        """Answer everybody who still waits."""
+        """Answer all waiting clients with a failure."""
         for number in list(self._waiting):
             self.answer(number, False, text)

@@ -1,8 +1,8 @@
-"""Which properties of a node a user can change through ROS.
+"""Properties of a node that a user can change through ROS.
 
 Quality of service: ``qos_overrides./xy/position.subscription.reliability`` and the like, as in rclcpp.
 
-Source: https://design.ros2.org/articles/qos_configurability.html. The topic STOP does not go this way, so that no file can make it unheard.
+Source: https://design.ros2.org/articles/qos_configurability.html. The topic STOP is exempt, so that no file can disable it.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ ALLOWED = {
 }
 DEEPEST = 1_000_000  # messages
 KINDS = {name: QoSPolicyKind[name.upper()] for name in ALLOWED}
-OF_RCLPY = ("/parameter_events", "/clock", "/rosout")  # made by rclpy itself, in moments in which no parameter may be declared
+OF_RCLPY = ("/parameter_events", "/clock", "/rosout")  # made by rclpy itself, when no parameter may be declared
 
 
 class Overridable(Node):
-    """A node that obeys qos_overrides for every publisher and subscription that it makes.
+    """A node that applies qos_overrides to every publisher and subscription that it makes.
 
-    Made with automatically_declare_parameters_from_overrides. Raises BadInput for a policy or a value that there is not.
+    It must be made with automatically_declare_parameters_from_overrides. Raises BadInput for an unknown policy or value.
     """
 
     def create_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **more: Any) -> Any:
@@ -44,7 +44,7 @@ class Overridable(Node):
         return super().create_subscription(msg_type, topic, callback, **_obeyed(self, (topic, qos_profile), "subscription", more))
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """As rclpy's; what is read only is refused with what to do."""
+        """As rclpy's; the refusal of a read-only parameter says what to do."""
         result = super().set_parameters_atomically(parameter_list)
         fixed = [item.name for item in parameter_list if self.has_parameter(item.name) and self.describe_parameter(item.name).read_only]
         if result.successful or not fixed:
@@ -54,7 +54,7 @@ class Overridable(Node):
 
 
 def overridden(node: Node, topic: str, side: str) -> dict[str, Any]:
-    """Policies that were given for a topic, by name, with their values; side: publisher or subscription."""
+    """The given policies of a topic: value by name; side: publisher or subscription. Raises BadInput for an unknown policy or value."""
     prefix = f"qos_overrides.{node.resolve_topic_name(topic)}.{side}"
     given = cast("dict[str, Parameter]", node.get_parameters_by_prefix(prefix))
     found = {name: parameter.value for name, parameter in given.items()}
@@ -69,7 +69,7 @@ def overridden(node: Node, topic: str, side: str) -> dict[str, Any]:
 
 
 def _obeyed(node: Node, of: tuple[str, Any], side: str, more: dict[str, Any]) -> dict[str, Any]:
-    """The profile, and which of its policies rclpy shall take from parameters: those that were given."""
+    """The profile, and the policies that rclpy takes from parameters: those that were given."""
     topic, quality = of
     if topic in OF_RCLPY or "qos_overriding_options" in more:
         return {"qos_profile": quality, **more}

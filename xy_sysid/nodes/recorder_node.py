@@ -18,9 +18,9 @@ from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.nodes.common import WalledNode, declare
 from xy_sysid.settings import RecorderSettings
 
-LOOK = 0.2  # s between two looks for new topics
-FLUSH = 1.0  # s between two commits
-DEPTH = 10_000  # messages that may wait while the disk is busy
+LOOK = 0.2  # s between two checks for new topics
+FLUSH = 1.0  # s between two commits to disk
+DEPTH = 10_000  # most messages that wait while the disk is busy
 
 
 class RecorderNode(WalledNode):
@@ -46,7 +46,7 @@ class RecorderNode(WalledNode):
         self._look()
 
     def _look(self) -> None:
-        """Subscribe to what is new and wanted."""
+        """Subscribe to new topics that match."""
         space = self.get_namespace().rstrip("/") + "/"
         for topic, types in self.get_topic_names_and_types():
             name = topic.removeprefix(space)
@@ -72,7 +72,7 @@ class RecorderNode(WalledNode):
         self.get_logger().info(f"recording {topic}")
 
     def _quality(self, topic: str) -> QoSProfile:
-        """What suits the publisher: reliable and latched only if it is."""
+        """The quality of service for a topic: reliable and latched only if all its publishers are."""
         offers = [info.qos_profile for info in self.get_publishers_info_by_topic(topic)]
         reliable = all(offer.reliability == ReliabilityPolicy.RELIABLE for offer in offers)
         latched = all(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
@@ -104,7 +104,7 @@ class RecorderNode(WalledNode):
             self.exit_code = 1
 
     def last_words(self) -> None:
-        """Finish the bag and say what is in it."""
+        """Finish the bag and log its content."""
         self._bag.close()
         flushed(self._bag.path)
         numbers = ", ".join(f"{topic} {number}" for topic, number in sorted(self._heard.items())) or "nothing was published"

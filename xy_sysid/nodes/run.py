@@ -1,6 +1,6 @@
-"""The main loop of every node: Ctrl-C and SIGTERM are wishes, the node ends in order, exactly once.
+"""The main loop of every node: after Ctrl-C or SIGTERM the node ends in order, exactly once.
 
-Imports nothing heavy, so that the signals are in hand before anything that takes time.
+Imports nothing large, so that the signal handlers are installed first.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from typing import Any, Protocol, cast
 from xy_sysid.errors import MissingExtra, XySysidError
 from xy_sysid.processes.terminal import printable
 
-LOOK = 0.1  # s between two looks whether the node is to end
-LONGEST_STOP = 3.0  # s an orderly end may take; then the last words are said without waiting
+LOOK = 0.1  # s between two checks whether the node has to end
+LONGEST_STOP = 3.0  # s that an orderly end may take; then ``last_words`` is called without waiting
 
 
 class Runnable(Protocol):
-    """What a node class adds to rclpy's Node; ``WalledNode`` in common.py has it all at its simplest."""
+    """The methods that a node class adds to rclpy's Node; ``WalledNode`` in common.py has the simplest ones."""
 
     exit_code: int | None  # set it to end the process
 
     def ask_to_stop(self, reason: str) -> None:
-        """Begin to end; the node goes on spinning until ``has_stopped``."""
+        """Begin to end; the node keeps spinning until ``has_stopped``."""
         ...
 
     def has_stopped(self) -> bool:
-        """Nothing is left to do but the last words."""
+        """True if only ``last_words`` is left to do."""
         ...
 
     def last_words(self) -> None:
-        """Called once, whatever happened, while publishers still work."""
+        """Called once, also after errors, while publishers still work."""
         ...
 
     def destroy_node(self) -> None:
@@ -48,7 +48,7 @@ class Runnable(Protocol):
 
 
 def maker(place: str) -> Callable[[], Runnable]:
-    """What makes a node. place: module:class, imported when the node is made: after the signals are in hand and rclpy is known to be there."""
+    """The factory of a node. place: module:class, imported when the node is made, after signal handlers and rclpy."""
     module, _, name = place.partition(":")
     return lambda: cast("Runnable", getattr(import_module(module), name)())
 
@@ -59,10 +59,10 @@ def executable(place: str) -> Callable[[], int]:
 
 
 def run_node(factory: Callable[[], Runnable], args: Sequence[str] | None = None) -> int:
-    """Make the node and spin it until a signal, its own ``exit_code`` or an error; the exit code of the process.
+    """Make the node and spin it until a signal, its own ``exit_code`` or an error; returns the exit code of the process.
 
     factory: makes the node, after rclpy is initialised; args: as for rclpy.init, the process' own by default.
-    2 with one line on stderr if rclpy is missing or an argument or parameter is wrong.
+    The code is 2, with one line on stderr, if rclpy is missing or an argument or parameter is wrong.
     """
     asked: list[int] = []
 
@@ -104,7 +104,7 @@ def _spin(node: Runnable, asked: list[int]) -> None:
     executor, never = EventsExecutor(), Future()
     executor.add_node(cast("Any", node))
     while not asked and node.exit_code is None:
-        executor.spin_until_future_complete(never, timeout_sec=LOOK)  # spin_once comes back after every message, which costs more
+        executor.spin_until_future_complete(never, timeout_sec=LOOK)  # spin_once returns after every message, which is slower
     node.ask_to_stop(signal.Signals(asked[0]).name if asked else "finished")
     until = time.monotonic() + LONGEST_STOP
     while not node.has_stopped() and time.monotonic() < until:
@@ -112,6 +112,6 @@ def _spin(node: Runnable, asked: list[int]) -> None:
 
 
 def _refuse(error: Exception) -> int:
-    """One line on stderr; what rcl adds about its own source files is left out."""
+    """Write one line on stderr, without rcl's references to its source files."""
     sys.stderr.write(printable(" ".join(str(error).split(", at /")[0].split())) + "\n")
     return 2

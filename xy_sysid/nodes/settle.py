@@ -1,7 +1,7 @@
-"""Carries a walk to a settled diagnosis out on the machine: records, has the next experiment designed, runs it, and so on.
+"""Conducts a walk to a settled diagnosis on the machine: records, has the next experiment designed, runs it, and so on.
 
-``experiment_design.walk`` decides, in a process of its own; here are only time, topics, services and bags. The excitation checks every experiment
-against its own limits once more. Afterwards its settings are what they were.
+``experiment_design.walk`` decides, in a separate process; this module has only time, topics, services and bags. The excitation checks every
+experiment with its own limits again. Afterwards its settings are restored.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from xy_sysid.processes.settle_process import Decider
 from xy_sysid.settings import ExcitationSettings, knobs
 from xy_sysid.story.attempt import BROKEN
 
-FIRST = 12.0  # s of the first recording, of what drives the machine when the walk begins
-WHOLE = 0.95  # part of its seconds with which an experiment counts as carried out; less was stopped
-LATE = 10.0  # s on the wall without a sample after which a recording ends, however busy the computer is
-SETTLES = 0.5  # s in which the node tells its state after a change
+FIRST = 12.0  # s of the first recording, with the excitation at the beginning of the walk
+WHOLE = 0.95  # part of its duration after which an experiment counts as complete; a shorter one was stopped
+LATE = 10.0  # s of wall-clock time without a sample after which a recording ends
+SETTLES = 0.5  # s in which the excitation publishes its state after a change
 QUALITY = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
 
 
 @dataclass(frozen=True, slots=True)
 class Wishes:
-    """What is asked for. axis: its name; folder: of the bags and decisions, new; sets: of effects, empty: of the diagnosis
-    budget: of the walk; first: s of the first recording; alone: begin to drive and go on without being told
+    """The request. axis: its name; folder: for bags and decisions, new; sets: of effects to distinguish, empty: those of the diagnosis
+    budget: of the walk; first: s of the first recording; alone: start to drive without waiting for activation
     """
 
     axis: str
@@ -61,7 +61,7 @@ class Wishes:
 
 
 def plan_of(wishes: Wishes, settings: ExcitationSettings) -> WalkPlan:
-    """The plan of a walk on a machine with these settings, whose limits are its own. Raises BadInput for an axis that no experiment can move so."""
+    """The plan of a walk on a machine with these settings and limits. Raises BadInput for an unknown axis or a position interface."""
     axis = wishes.axis
     if axis not in settings.axes:
         raise BadInput("axis", repr(axis), ", ".join(settings.axes), "Choose an axis that the excitation drives.")
@@ -74,26 +74,26 @@ def plan_of(wishes: Wishes, settings: ExcitationSettings) -> WalkPlan:
 
 
 class Settler(ExcitationClient):
-    """``run`` does it all, in a thread of its own; others read ``steps``, ``doing``, ``part``, ``ending`` and ``problem``."""
+    """``run`` conducts the walk, in a separate thread; others read ``steps``, ``doing``, ``part``, ``ending`` and ``problem``."""
 
     def __init__(
         self, wishes: Wishes, say: Callable[[str], None], ended: Callable[[], bool], go: Callable[[], bool], namespace: str = NAMESPACE
     ) -> None:
-        """say: takes each line for people; ended: called often; true if the user wants to end it; go: whether experiments may run."""
+        """say: called with each line for the user; ended: called often, true if the user wants to stop; go: true if experiments may run."""
         super().__init__("settle", ended, namespace)
         self.wishes = wishes
         self.steps: tuple[dict[str, Any], ...] = ()
         self.doing, self.part, self.ending, self.problem = "", 0.0, "", ""
         self._say, self._go, self._namespace = say, go, namespace.rstrip("/")
         self._bag: BagWriter | None = None
-        self._samples: tuple[int, float] = (0, 0.0)  # positions that were recorded, and their sampling rate
+        self._samples: tuple[int, float] = (0, 0.0)  # recorded voltage samples, and their rate, Hz
         self._status: dict[str, str] = {}
         self._message = ""
-        self._wall = Wall(lambda words: None)  # told in a sentence at the end, and in the log
+        self._wall = Wall(lambda words: None)  # reported in a sentence at the end, and in the log
         self._node.create_subscription(DiagnosticArray, "metrics", self._wall.around(self._on_statuses), 100)
 
     def run(self) -> bool:
-        """Whether it came to an end that is none of a fault; ``problem`` says what was wrong, ``ending`` how it ended."""
+        """True if the walk ended without a fault; ``problem`` is a sentence on the fault, ``ending`` the reason of the end."""
         before: ExcitationSettings | None = None
         with self._wall:
             try:
@@ -113,7 +113,7 @@ class Settler(ExcitationClient):
 
     @property
     def outcome(self) -> str:
-        """How it ended, in a sentence: a fault, what is settled, or what is still possible if it was stopped."""
+        """The end in a sentence: a fault, the settled set, or the sets that are still possible if it was stopped."""
         if self.problem or not self.steps:
             return self.problem or "Stopped before the first recording was diagnosed."
         last = self.steps[-1]
@@ -150,7 +150,7 @@ class Settler(ExcitationClient):
     # the machine
 
     def _first(self, settings: ExcitationSettings) -> Path:
-        """A recording of what drives the machine now, after which it stands."""
+        """The bag of a recording of the present excitation, which is then deactivated."""
         self.doing = f"recording {self.wishes.first:.0f} s of the present excitation"
         state = self.state()
         if state != "active" and not self.wishes.alone:
@@ -166,7 +166,7 @@ class Settler(ExcitationClient):
         return self.wishes.folder / "0"
 
     def _carried_out(self, number: int, step: dict[str, Any], settings: ExcitationSettings) -> Path:
-        """The bag of an experiment that the excitation has checked and run; ``ending`` is stopped where it did not run to its end."""
+        """The bag of an experiment that the excitation has checked and run; sets ``ending`` to stopped if it was not complete."""
         file, seconds = self.wishes.folder / f"next_{number}.yaml", float(step["lasts"])
         write_text(file, f"# Experiment {number} of a walk. {step['words']}\n" + yaml.safe_dump(step["file"], sort_keys=False, width=120))
         self.doing = f"running experiment {number}: {step['words']}, {seconds:.0f} s"
@@ -187,7 +187,7 @@ class Settler(ExcitationClient):
         return self.wishes.folder / str(number)
 
     def _record(self, seconds: float, settings: ExcitationSettings) -> None:
-        """Until so many s of positions have come, or the excitation drives no more."""
+        """Wait until this many s of voltage have been recorded, no samples come, or the excitation has stopped."""
         heard, newest, driven = 0, time.monotonic(), False
         while time.monotonic() < newest + max(LATE, settings.patience) and not self._over():
             self.wait(0.05)
@@ -197,11 +197,11 @@ class Settler(ExcitationClient):
             if self._samples[1] and self._samples[0] >= seconds * self._samples[1]:
                 return
             if driven and self._status.get("state") in ("stopped", "idle"):
-                self.wait(SETTLES)  # what is on its way
+                self.wait(SETTLES)  # messages in transit
                 return
 
     def _decided(self, decider: Decider, bag: Path) -> dict[str, Any] | None:
-        """The next step, or None if it was ended meanwhile."""
+        """The next step, or None if the walk was ended meanwhile. Raises BadInput if the decision fails."""
         if self.ending:
             return None
         self.doing, self.part = "diagnosing all recordings and designing the next experiment", 0.0
@@ -218,13 +218,13 @@ class Settler(ExcitationClient):
         return None
 
     def _over(self) -> bool:
-        """Somebody has ended it, or STOP is on."""
+        """True if the user has ended the walk, STOP is on, or an error occurred."""
         if not self.ending and (self._is_over() or self._status.get("stop") == "on"):
             self.ending = "stopped"
         return bool(self.ending or self._wall.count)
 
     def _change(self, label: str) -> None:
-        """A transition; a refusal is told in the excitation's own words."""
+        """A transition; raises BadInput with the excitation's own words if it is refused."""
         try:
             self.transition(label)
         except BadInput:
@@ -233,7 +233,7 @@ class Settler(ExcitationClient):
         self.wait(0.05)
 
     def _rest(self, before: ExcitationSettings | None) -> None:
-        """The machine stands, and what experiments have changed is as it was. What an operator has changed meanwhile, as a limit, stays."""
+        """Deactivate, and restore the settings that experiments change. Other changes, as of limits by an operator, are kept."""
         if before is None:
             return
         try:
@@ -248,7 +248,7 @@ class Settler(ExcitationClient):
         except BadInput as problem:
             self.problem = self.problem or str(problem)
 
-    # what is heard
+    # subscriptions
 
     def _listen(self, settings: ExcitationSettings) -> None:
         topics: dict[str, Any] = {"voltage": Float64MultiArray}
@@ -277,7 +277,7 @@ class Settler(ExcitationClient):
 
     @contextmanager
     def _recording(self, number: int, settings: ExcitationSettings) -> Iterator[None]:
-        """Meanwhile everything heard goes into a bag, which is whole at the end."""
+        """Write all received messages to a bag meanwhile, which is complete at the end."""
         units = dict(zip(("input_unit", "output_unit"), settings.units, strict=True))
         with BagWriter(self.wishes.folder / str(number), custom=units) as bag:
             self._bag, self._samples = bag, (0, 0.0)

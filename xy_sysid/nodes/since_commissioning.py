@@ -1,4 +1,4 @@
-"""What a node says of its axes compared with commissioning: the settings ``baseline`` and ``baseline_table`` -> statuses."""
+"""Statuses of a node's axes compared with commissioning, from the settings ``baseline`` and ``baseline_table``."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Column = Callable[[str], str]
 
 
 class SinceCommissioning:
-    """The baselines of the axes that a model file has; nothing at all without a file, and what compares is not even imported then.
+    """The baselines of the axes in a model file; without a file there are none, and the comparison is not imported.
 
-    models: its transfer functions, by axis; effects: names of those that models may have
+    models: transfer functions of the file, by axis; effects: names that models may contain
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class SinceCommissioning:
 
     @classmethod
     def of_identifier(cls, settings: IdentifierSettings, axes: tuple[str, ...]) -> SinceCommissioning:
-        """From a file of ``fit --model``. Raises BadRecording or BadInput for another one, or one of other axes."""
+        """From a file of ``fit --model``. Raises BadRecording or BadInput for another file, or one of other axes."""
         if not settings.baseline:
             return cls({}, settings.baseline_table, str, {})
         from xy_sysid.fleets.commissioned import of_transfer_functions
@@ -54,7 +54,7 @@ class SinceCommissioning:
 
     @classmethod
     def of_diagnoser(cls, settings: DiagnoserSettings, axes: tuple[str, ...], library: Library) -> SinceCommissioning:
-        """From a file of ``refine --model``. Raises BadRecording or BadInput for another one, or one of other axes."""
+        """From a file of ``refine --model``. Raises BadRecording or BadInput for another file, or one of other axes."""
         if not settings.baseline:
             return cls({}, settings.baseline_table, str, {})
         from xy_sysid.fleets.columns import column_of
@@ -65,7 +65,7 @@ class SinceCommissioning:
         return cls(known, settings.baseline_table, column_of, {}, library.effects)
 
     def forget(self) -> None:
-        """Nothing was heard yet."""
+        """Delete the comparisons so far."""
         self._baselines: dict[str, Baseline] = {}
         if self._known:
             from xy_sysid.fleets.baseline import Baseline
@@ -73,7 +73,7 @@ class SinceCommissioning:
             self._baselines = {axis: Baseline(known, self._spreads, self._column, self._effects) for axis, known in self._known.items()}
 
     def hear(self, axis: str, estimates: Iterable[Estimate | Interval], begin: float, end: float) -> None:
-        """The estimates of a stretch of data of an axis; see ``Baseline.hear``."""
+        """Add the estimates from a stretch of data of an axis; begin, end: s; see ``Baseline.hear``."""
         if axis in self._baselines:
             from xy_sysid.greybox.parameters import Estimate
 
@@ -81,7 +81,7 @@ class SinceCommissioning:
             self._baselines[axis].hear(found, begin, end)
 
     def statuses(self) -> list[StatusMessage]:
-        """One for each axis that has a baseline."""
+        """A status for each axis that has a baseline."""
         if not self._baselines:
             return []
         from xy_sysid.fleets.baseline_words import status
@@ -97,7 +97,7 @@ class SinceCommissioning:
 
 
 def column_of_fit(name: str) -> str:
-    """The column of the fleet's table of an estimate of a transfer function."""
+    """The column for an estimate of a transfer function in the table of the fleet."""
     from xy_sysid.fleets.columns import column_of
 
     return f"tf_{column_of(name)}"

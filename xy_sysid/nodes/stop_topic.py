@@ -1,7 +1,7 @@
-"""The topic STOP, heard per publisher.
+"""The topic STOP, with the publisher of each message.
 
-rclpy gives no callback the identity of a message's publisher (7.1: its message info has times and sequence numbers alone), but ``rcl_take``
-of the C library below it does. So these subscriptions are no part of the node's executor; ``listen`` takes what has come.
+rclpy does not give callbacks the identity of a message's publisher (7.1: its message info has only times and sequence numbers), but ``rcl_take``
+of its C library does. So these subscriptions are not part of the node's executor; ``listen`` takes the received messages.
 
 Source: rmw/types.h, ``rmw_message_info_t``: source_timestamp, received_timestamp, publication_sequence_number and reception_sequence_number of
 8 bytes each, then ``rmw_gid_t``: a pointer, and the bytes of the identity.
@@ -25,13 +25,13 @@ from xy_sysid.nodes.common import STOP_HEARD, STOP_TOPIC
 from xy_sysid.nodes.wall import Wall
 
 NUMBER, IDENTITY = slice(16, 24), slice(40, 56)  # bytes of rmw_message_info_t
-ROOM = 512  # bytes, more than any rmw_message_info_t has
+ROOM = 512  # bytes, more than the size of rmw_message_info_t
 TAKEN = 0  # RCL_RET_OK
 RELEASE = "~/release_stop"
 
 
 class StopTopic:
-    """Subscribes, and offers the service by which an operator overrides. held: STOP is on. Raises BadInput without the C library of ROS 2."""
+    """Subscribes, and offers the service with which an operator overrides STOP. Raises BadInput without the C library of ROS 2."""
 
     def __init__(self, node: Node, wall: Wall) -> None:
         self._node, self._latch = node, StopLatch()
@@ -49,16 +49,16 @@ class StopTopic:
 
     @property
     def held(self) -> bool:
-        """STOP is on."""
+        """True if STOP is on."""
         return bool(self._latch.holders)
 
     @property
     def holders(self) -> list[str]:
-        """Names of those who hold it."""
+        """Names of the publishers that hold STOP."""
         return [self._name(one) for one in self._latch.holders]
 
     def listen(self) -> bool:
-        """Take what has come; whether STOP has changed."""
+        """Take the received messages; returns whether STOP has changed."""
         before = self._latch.holders
         for subscription in self._heard:
             with subscription:
@@ -67,13 +67,13 @@ class StopTopic:
         return bool(before) != self.held
 
     def close(self) -> None:
-        """Leave the topic."""
+        """End the subscriptions."""
         for subscription in self._heard:
             subscription.destroy_when_not_in_use()
         self._heard.clear()
 
     def why(self) -> str:
-        """Whose STOP is on and what to do, in a sentence."""
+        """A sentence on who holds STOP and what to do."""
         who = ", ".join(self.holders)
         return (
             f"STOP is on (topic {STOP_TOPIC}, from {who}): activate is refused until the same publisher sends false; "
@@ -88,7 +88,7 @@ class StopTopic:
         return True
 
     def _look(self) -> set[bytes]:
-        """Who publishes the topic; names are kept, as a message may come before its sender's name, and the sender may go."""
+        """The present publishers; their names are kept, because a message may arrive before its sender's name, and the sender may end."""
         present = set()
         for info in self._node.get_publishers_info_by_topic(self._node.resolve_topic_name(STOP_TOPIC)):
             publisher = bytes(info.endpoint_gid)[: IDENTITY.stop - IDENTITY.start]

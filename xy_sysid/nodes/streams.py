@@ -1,4 +1,4 @@
-"""What a node that listens to a machine has: its axes, and the streams of voltage and position, as blocks or joint states."""
+"""The subscriptions of a node to the streams of a machine: voltage and position, as blocks or joint states."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ HEARING = ("source", "output", "effort_as_voltage", "joints", "joint_topic", "ef
 
 
 class Streams:
-    """Subscribes, refuses in words what is no block, and feeds the rest on.
+    """Subscribes, and passes every valid block on.
 
-    refused: why the last message was refused, empty if none was; refusals: how many were
+    refused: why the last message was refused, empty if none was; refusals: their number
     """
 
     def __init__(
         self, node: Node, axes: tuple[str, ...], settings: IdentifierSettings | DiagnoserSettings, feed: Callable[[Any, Block], None]
     ) -> None:
-        """settings: source, output, effort_as_voltage, joints, ...; feed: gets every block and its stream. Raises BadInput for joints of no axis."""
+        """settings: source, output, effort_as_voltage, joints, ...; feed: called with stream and block. Raises BadInput for unknown joints."""
         source, effort = settings.source, settings.effort_as_voltage
         self._lag = settings.effort_lag
         self._reader = JointReader(joints_of(axes, given(settings.joints)), settings.output, effort)
@@ -63,7 +63,7 @@ class Streams:
             Ear(node, Float64MultiArray, "reference", self._on_reference, DATA_QOS)
 
     def forget(self) -> None:
-        """Discard all that was learned from the streams: the rate and the counter of joint states, what was refused."""
+        """Delete the state of the streams: rate and counter of joint states, and refusals."""
         self.refused, self.refusals = "", 0
         self.recent = Recent()
         self._joints = JointCounter(self._axes, with_voltage=not self._effort, output=self._output)
@@ -72,9 +72,9 @@ class Streams:
         self._paired = 0  # samples, at the last look
 
     def heard(self, samples: int, sentences: Mapping[str, str], faults: Mapping[str, int]) -> Heard:
-        """What came since the last call; samples: paired since the start; sentences, faults: what the pairing says, and how often, by reason.
+        """The reception since the last call; samples: paired since the start; sentences, faults: texts of the pairing and their numbers, by reason.
 
-        What has not happened again for some seconds is over.
+        A fault that has not occurred again for some seconds is left out.
         """
         now = time.monotonic()
         going_on = {why: text for why, text in sentences.items() if self.recent.goes_on(why, (text, faults.get(why, 0)), now)}
@@ -138,7 +138,7 @@ class Streams:
 
 
 def answered(act: Callable[[], str], _request: Any, response: Any) -> Any:
-    """The response of a Trigger service: what ``act`` says, or why it could not."""
+    """The response of a Trigger service: the text of ``act``, or of its error."""
     try:
         response.message, response.success = act(), True
     except (XySysidError, OSError) as problem:

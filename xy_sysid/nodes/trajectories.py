@@ -1,8 +1,8 @@
-"""What a JointTrajectoryController hears: trajectory_msgs/JointTrajectory, with stamps, of which each ends at rest.
+"""Commands for a JointTrajectoryController: stamped trajectory_msgs/JointTrajectory messages that end at rest.
 
-A new message replaces the one before. Points before the present are passed over, so pieces of one motion that overlap are one motion.
-Points with accelerations are joined by polynomials of fifth order, those without, while it brakes, of third order: there the acceleration is
-constant and jumps at its ends.
+A new message replaces the one before. The controller skips points in the past, so overlapping pieces of one motion give one motion. It joins
+points with accelerations by polynomials of fifth order, and those without, while braking, of third order: there the acceleration is constant and
+jumps at its ends.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from xy_sysid.nodes.commands import Commands
 from xy_sysid.samples.block import FloatArray
 
 BILLION = 1_000_000_000
-HOLDS = 0.1  # s in which a joint that was held back is told to stay where it is
+HOLDS = 0.1  # s after which a joint that was held back has to be at rest at its position
 
 
 class Trajectories(Commands):
-    """As ``Commands``."""
+    """``Commands`` as trajectories."""
 
     says = JointTrajectory
 
     def send(self, drive: Drive, values: FloatArray, at: float) -> bool:
-        """See ``Commands``: the piece that is due; the others of the controller's joints stay where they are."""
+        """As ``Commands``: send the next piece, if it is due; the controller's other joints hold their positions."""
         assert isinstance(drive, TrajectoryDrive)
         if not np.isfinite(self._of_all(values, self._kept)).all():
             return False
@@ -40,7 +40,7 @@ class Trajectories(Commands):
         return True
 
     def rest(self, drive: Drive) -> None:
-        """See ``Commands``: a controller brakes by itself at the end of what it was told; a joint that something held back stays there."""
+        """As ``Commands``: the controller brakes by itself at the end of a trajectory; a joint that was held back gets its present position."""
         assert isinstance(drive, TrajectoryDrive)
         strayed = drive.strayed
         if strayed is not None:

@@ -1,7 +1,7 @@
 """Wrapper of every callback: an error is reported once, and the node continues with the next message.
 
-The wall stands around each callback and not around the executor, because an error that leaves a callback makes rclpy's
-EventsExecutor leave the messages that wait behind it unread (7.1.6).
+Each callback is wrapped and not the executor, because after an error in a callback rclpy's EventsExecutor drops the waiting
+messages (7.1.6).
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any
 
 from xy_sysid.processes.terminal import printable
 
-LONGEST = 200  # characters of an error that are told
+LONGEST = 200  # most characters of an error in a report
 
 
 class Wall:
     """``with wall: ...`` catches errors and reports them. count: errors so far; told: the last one, empty if there was none."""
 
     def __init__(self, say: Callable[[str], None], what: str = "a message or request could not be handled") -> None:
-        """say: takes the sentence, once for the same error again and again; what: how it begins."""
+        """say: called with the sentence, once for repeated equal errors; what: its first words."""
         self.count, self.told = 0, ""
         self._say, self._what = say, what
 
@@ -39,7 +39,7 @@ class Wall:
         return True
 
     def around(self, callback: Callable[..., Any]) -> Callable[..., Any]:
-        """The callback behind the wall; after an error it returns its last argument, which for a service is the response."""
+        """The wrapped callback; after an error it returns its last argument, which for a service is the response."""
 
         @functools.wraps(callback)
         def walled(*arguments: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Sum, product, inverse and closed loop of responses, with uncertainty (first order; errors of two measurements are taken to be independent).
+"""Sum, product, inverse and closed loop of responses, with uncertainty (first order; errors of two measurements are assumed to be independent).
 
 The second operand may be another response, anything with ``response(frequency)`` and units (a transfer function), or a number. Two
 measured responses are interpolated to the lines of the first, within their common band.
@@ -28,7 +28,7 @@ class Operand:
 
 
 def added(one: FrequencyResponse, other: Any, sign: float = 1.0) -> FrequencyResponse:
-    """one + sign other; both must have the same units."""
+    """one + sign other. Raises BadInput for different units, or bands without common lines."""
     one, second = _together(one, other)
     if second.output_unit and (second.input_unit, second.output_unit) != (one.input_unit, one.output_unit):
         raise _apart("sum", one, second)
@@ -36,7 +36,7 @@ def added(one: FrequencyResponse, other: Any, sign: float = 1.0) -> FrequencyRes
 
 
 def multiplied(one: FrequencyResponse, other: Any) -> FrequencyResponse:
-    """Series connection: the output of other is the input of one."""
+    """Series connection: the output of other is the input of one. Raises BadInput if their units or bands do not match."""
     one, second = _together(one, other)
     if second.output_unit and second.output_unit != one.input_unit:
         raise _apart("product", one, second)
@@ -54,7 +54,10 @@ def inverted(one: FrequencyResponse) -> FrequencyResponse:
 
 
 def closed(plant: FrequencyResponse, controller: Any) -> FrequencyResponse:
-    """The closed loop from reference to output, P C / (1 + P C); the controller goes from the plant's output to its input."""
+    """The closed loop from reference to output, P C / (1 + P C); the controller is from the plant's output to its input.
+
+    Raises BadInput if units or bands do not match.
+    """
     plant, second = _together(plant, controller)
     if second.output_unit and (second.output_unit, second.input_unit) != (plant.input_unit, plant.output_unit):
         raise _apart("loop", plant, second)

@@ -1,4 +1,4 @@
-"""Spectra of a full recording at once: the same sums as window by window, at the cost of the FFTs alone.
+"""Spectra of a full recording at once: the same sums as window by window, in little more time than the FFTs.
 
 One complex transform serves both signals, u + j y: the spectrum of a real signal is even, that of j times one is odd
 (Press et al., Numerical Recipes, 3rd ed., sec. 12.3.1).
@@ -60,7 +60,7 @@ def _accumulate(z: ComplexArray, scale: float, gxx: FloatArray, gyy: FloatArray,
 def batch_spectra(runs: list[tuple[int, FloatArray, FloatArray]], shape: WindowShape, differenced: bool) -> Spectra:
     """Spectra of one axis, summed over gap-free runs.
 
-    runs: (counter of the first sample, input (n,), output (n,)) each; windows start on multiples of the hop, as online.
+    runs: (counter of the first sample, input (n,), output (n,)) each; windows start at multiples of the hop, as online.
     Raises BadInput if no run holds a window.
     """
     lines = shape.length // 2 + 1

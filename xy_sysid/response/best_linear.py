@@ -21,11 +21,11 @@ DRIVEN = 1e-3  # of the strongest line's power; a weaker line is not excited
 FEWEST = 2  # realisations, and periods of each
 
 Realisation = tuple[FloatArray, FloatArray]
-"""Input (periods, length) and output (periods, length), the output differenced where the response is."""
+"""Input (periods, length) and output (periods, length), the output differenced if the response is."""
 
 
 def best_linear(frf: FrequencyResponse, realisations: Sequence[Realisation]) -> FrequencyResponse:
-    """The response with its scatter over realisations and periods; unchanged if there are too few of either.
+    """The response averaged over realisations, with its scatter over realisations and periods; unchanged if there are too few of either.
 
     frf: of the same windows, one period each. ``sigma`` becomes the larger of the values from noise and from noise plus distortion; ``noise`` and
     ``distortion`` are the standard deviations of one realisation's response.

@@ -23,7 +23,7 @@ SUFFICES = 0.01  # of the axis's own motion; models of machines are not more acc
 BANDS = 24  # number of bands for averaging the coupling
 ALIKE = 0.95  # coherence of the two inputs from which their effects cannot be separated
 FEWEST = 4.0  # minimum number of independent windows
-LONGER = 4  # window length relative to that of one axis: bands average lines here, and leakage of the axis's own response is smaller
+LONGER = 4  # window length relative to that of one axis: lines are averaged in bands, and leakage of the axis's own response is smaller
 COMBINED = {
     "corexy": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
     "gantry": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
@@ -32,7 +32,7 @@ COMBINED = {
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Coupling:
-    """How two axes affect each other.
+    """The coupling of two axes.
 
     axes: their names; response: (lines, 2, 2) complex, output i over input j; sigma: (lines, 2, 2); frequency: (lines,) Hz, of the used lines
     windows, seconds: averaged data; needed: s of such a recording after which the largest 95 % limit would fall to SUFFICES
@@ -62,7 +62,7 @@ class Coupling:
 
     @property
     def coupled(self) -> bool:
-        """True if they certainly do not suffice."""
+        """True if two single-axis models certainly do not suffice."""
         return bool(np.any(self.coupling > SUFFICES))
 
     @property
@@ -197,7 +197,7 @@ def coupling_of(
 
 
 def single(found: Coupling, output: int, driven: int, recording: Recording) -> FrequencyResponse:
-    """One of the four responses as a FrequencyResponse."""
+    """One of the four responses as a FrequencyResponse; output, driven: 0 or 1, the axes of output and input."""
     return FrequencyResponse(
         frequency=found.frequency,
         response=found.response[:, output, driven],

@@ -26,7 +26,7 @@ GROUPS = 12  # of free lines, for a readable spectrum
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Distortion of one kind: on free lines, in velocity.
+    """Distortion of one kind, on free lines, of the velocity.
 
     level: distortion relative to the output on excited lines, mean power, dB; noise: the same for the part that does not repeat
     over_noise: power ratio; seen: True if it exceeds what noise explains

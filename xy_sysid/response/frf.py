@@ -62,8 +62,8 @@ class FrequencyResponse:
     differenced:      True if the window was applied to the difference y[n+1] - y[n] of the output, and the estimate divided by
                       exp(j w T) - 1, so that the smoothing acts on the response times (exp(j w T) - 1)
     noise, distortion: (m,) standard deviations of the response of one realisation due to noise and due to nonlinear distortion, if several
-                      realisations of a periodic input separate them; else (0,)
-    origin:           axis, samples and notes, where they are known
+                      realisations of a periodic input separate them; otherwise (0,)
+    origin:           axis, samples and notes, if they are known
     """
 
     frequency: FloatArray
@@ -113,7 +113,7 @@ class FrequencyResponse:
         )
 
     def __add__(self, other: Any) -> FrequencyResponse:
-        """Sum with a response, a transfer function or a number; errors are taken to be independent. Raises BadInput if units differ."""
+        """Sum with a response, a transfer function or a number; errors are assumed to be independent. Raises BadInput if units differ."""
         return _algebra("added")(self, other)
 
     def __sub__(self, other: Any) -> FrequencyResponse:

@@ -1,7 +1,7 @@
 """Does the input have a part that follows the direction of motion? If so, friction distorts the frequency response.
 
-The inverse dynamic model, input = a * acceleration + b * speed + c * direction + d, fitted by least squares to samples that went
-through one low-pass (Janot, Gautier, Brunot 2019, for EMPS). This is a hint for the user; the diagnosis names the effect.
+The inverse dynamic model, input = a * acceleration + b * speed + c * direction + d, is fitted by least squares to samples after a common
+low-pass (Janot, Gautier, Brunot 2019, for EMPS). This is a hint for the user; the diagnosis names the effect.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from xy_sysid.samples.block import FloatArray
 
 PART_OF_RATE = 0.02  # cut-off of the low-pass over the sampling rate: far below any lag that the model omits
 SLOWEST = 0.02  # of the rms speed: for slower motion the direction counts as zero
-SURE = 8.0  # standard errors from which the hint is given; linear simulated axes stay below 3, EMPS has 219
+SURE = 8.0  # least standard errors for the hint; linear simulated axes stay below 3, EMPS has 219
 ENOUGH = 200  # samples after decimation needed for a hint
 
 
@@ -62,7 +62,7 @@ def friction_hint(u: FloatArray, y: FloatArray, sampling_rate: float) -> Frictio
 def friction_note(hint: FrictionHint | None) -> str:
     """The sentence for the user, empty without a hint.
 
-    It gives no size: under noise, this regression finds a fifth of the friction that a fit by simulation recovers exactly.
+    It gives no size: with noise, this regression may find a fifth of the friction that a fit by simulation finds exactly.
     """
     if hint is None or hint.level < SURE * hint.error:
         return ""

@@ -1,4 +1,4 @@
-"""A frequency response measured elsewhere -> FrequencyResponse, with an uncertainty from its coherence or its own scatter."""
+"""A frequency response measured elsewhere -> FrequencyResponse, with the given uncertainty, or one from its coherence or its scatter."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ SMALLEST = 1e-6  # of the response: numbers in files are not more accurate
 class Known:
     """Additional information on a response.
 
-    sigma: (m,) standard deviation of the complex error; coherence: (m,) 0..1; averages: independent averages behind the coherence
-    sampling_rate: Hz, twice the highest line if it is not known
+    sigma: (m,) standard deviation of the complex error; coherence: (m,) 0..1; averages: independent averages of the coherence
+    sampling_rate: Hz, twice the highest line if it is unknown
     """
 
     sigma: Any = None
@@ -93,7 +93,7 @@ def _sigma(f: FloatArray, h: ComplexArray, told: dict[str, FloatArray], averages
 
 
 def _roughness(f: FloatArray, h: ComplexArray) -> tuple[FloatArray, float]:
-    """(m,) scatter about a local parabola over log frequency, and its degrees of freedom; neighbours are scaled to one size."""
+    """(m,) scatter about a local parabola over the logarithm of frequency, and its degrees of freedom."""
     width = min(NEIGHBOURS, f.size)
     x = np.log(f)
     error = np.empty(f.size)

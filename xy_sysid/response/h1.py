@@ -47,13 +47,13 @@ class H1Options:
     """Options of the estimate.
 
     differenced:   True if the spectra are of the output's forward difference, not of the output itself
-    periodic:      the window is an integer number of periods of the input, so that there is no leakage and only the excited lines
-                   carry information
-    band:          Hz, from and to
-    min_coherence: least of a line that is trusted
+    periodic:      True if the window is an integer number of periods of the input: there is no leakage, and only the excited lines
+                   have information
+    band:          (low, high) Hz
+    min_coherence: least coherence of a trusted line
     units:         of input and output
     rate_error:    relative standard error of the sampling rate
-    repeated:      least coherence of a line of a periodic input; less of a reference, which no feedback can make
+    repeated:      least coherence of a trusted line of a periodic input; 0 for a periodic reference, which feedback does not affect
     """
 
     differenced: bool
@@ -149,7 +149,7 @@ def _pairs(spectra: Spectra, shape: WindowShape) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _unmixing(shape: WindowShape) -> FloatArray:
-    """(2, LINES_APART) least squares: from the sums of the errors' correlation to the fractions of windows 0, and 1 or more, hops apart."""
+    """(2, LINES_APART) least-squares map from sums of the errors' correlation to the fractions of window pairs 0 hops, and 1 or more hops, apart."""
     correlation = error_correlation(shape)
     return np.asarray(np.linalg.pinv(np.stack((correlation[0], 2.0 * np.sum(correlation[1:], axis=0)), axis=1)))
 

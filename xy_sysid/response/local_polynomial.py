@@ -1,10 +1,10 @@
 """The local polynomial method: the response and the transients of each window as polynomials over the lines around each line.
 
 Within 2 n + 1 lines around line k, a window's spectrum is Y(k + r) = G(k + r) U(k + r) + T(k + r) + V. G and the transient T (leakage from the
-ends of a window) are smooth, so each is a polynomial in r. Linear least squares separates them, because U is rough. All windows share
-G. Each has its own T, which is projected out. The samples have no taper, so nothing is smoothed: with few windows and sharp
-resonances, bias and variance are smaller than with H1. (Pintelon, Schoukens, Vandersteen & Barbé, Mech. Syst. Signal Process. 24 (2010), 573-595;
-Pintelon & Schoukens, System Identification, 2nd ed., sec. 7.2.2)
+ends of a window) are smooth, so each is a polynomial in r. Linear least squares separates them, because U varies from line to line. All
+windows share G. Each has its own T, which is projected out. The samples have no taper, so nothing is smoothed: with few windows and
+sharp resonances, bias and variance are smaller than with H1. (Pintelon, Schoukens, Vandersteen & Barbé, Mech. Syst. Signal Process. 24
+(2010), 573-595; Pintelon & Schoukens, System Identification, 2nd ed., sec. 7.2.2)
 
 The local rational method gives G a denominator: (1 + a1 r + a2 r^2) Y = B U + T, which follows a resonance that is narrower than the lines used
 (McKelvey & Guérin, SYSID 2012). Its unknowns multiply the noisy output, so near a resonance that is narrower than a line sigma is up to four
@@ -27,9 +27,9 @@ from xy_sysid.samples.block import FloatArray
 
 ORDER = 2  # order of both polynomials
 POLES = 2  # order of the local rational method's denominator
-SIDE = 6  # lines to each side: 13 lines for 6 unknowns of a single window, and 8 of the rational one
+SIDE = 6  # lines to each side: 13 lines for the 6 unknowns of a single window, or 8 of the rational method
 EXCITED = 1e-3  # a line is excited if the power around it is above this fraction of the strong lines' power
-STRONG = 0.9  # quantile of the input power in the band that is called strong
+STRONG = 0.9  # quantile of the input power in the band that counts as strong
 CORRELATED = 0.02  # a smaller correlation of two lines' errors is neglected
 
 
@@ -51,7 +51,7 @@ class LocalSums:
 
 @lru_cache(maxsize=8)
 def _around(lines: int) -> tuple[np.ndarray, FloatArray, FloatArray]:
-    """(lines, 2 n + 1) indices of the lines around each, never 0 Hz; their distance in n; the projection that removes polynomials."""
+    """(lines, 2 n + 1) indices of the lines around each, without 0 Hz; their distance over n; the projection that removes polynomials."""
     first = np.clip(np.arange(lines) - SIDE, 1, max(lines - 1 - 2 * SIDE, 1))
     place = first[:, None] + np.arange(2 * SIDE + 1)[None, :]
     distance = (place - np.arange(lines)[:, None]) / SIDE

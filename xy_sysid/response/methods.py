@@ -1,4 +1,4 @@
-"""The methods for a frequency response. Each turns windows into sums, adds these, and computes the response. One row of METHODS per method."""
+"""The methods for a frequency response, one row of METHODS each: windows to sums, addition of sums, sums to response."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Running(Protocol):
 class ResponseMethod:
     """A method that estimates a frequency response.
 
-    reference: True if it needs one; tapered: True if windows overlap and have a taper (settings), else they are adjacent and rectangular
+    reference: True if it needs one; tapered: True if windows overlap and have a taper (settings), False if they are adjacent and rectangular
     transform: (shape, differenced) -> function from a window to the input of ``running``; running: (shape, forget, sliding)
     whole:     (pieces, shape, differenced) -> the sums over full stretches; estimate: (sums, shape, rate, options) -> the response
     windows:   sums -> number of windows in them

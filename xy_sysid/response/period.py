@@ -1,4 +1,4 @@
-"""Does the input repeat itself? Then a window of one period leaks nothing, and lines between the excited ones are noise."""
+"""Does the input repeat? Then a window of one period has no leakage, and lines between the excited ones are noise."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import scipy
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
-LIKENESS = 0.98  # correlation of the input with itself one period later; measured inputs carry a little noise
-OFF_WHOLE = 0.1  # of a sample that the true period may be off: windows then slip against it by less than half a sample in five
-TONE, TONES = 0.1, 8  # of the largest, and how many of them an input has that repeats with the other sign
-FEWEST = 2  # periods that must be there: fewer do not repeat
+LIKENESS = 0.98  # least correlation of the input with itself one period later; measured inputs have some noise
+OFF_WHOLE = 0.1  # of a sample: largest error of the period; over five windows less than half a sample
+TONE, TONES = 0.1, 8  # least size of a tone relative to the largest, and least number of tones for half periods
+FEWEST = 2  # least periods
 
 
 def find_period(u: FloatArray, shortest: int = 16) -> int | None:
-    """Period of a (n,) input in samples, or None if it is not there twice.
+    """Period of a (n,) input in samples, or None if there are fewer than two.
 
-    The first peak of the autocorrelation, checked and sharpened on the samples themselves.
+    It is the first peak of the autocorrelation, checked and refined on the samples.
     """
     signal = u - u.mean()
     number = signal.shape[0]
@@ -42,9 +42,9 @@ def find_period(u: FloatArray, shortest: int = 16) -> int | None:
 
 
 def find_half_period(u: FloatArray, shortest: int = 16) -> int | None:
-    """Samples after which a (n,) input comes again with the other sign, as an odd multisine does after half its period; None if none is there twice.
+    """Samples after which a (n,) input repeats with the opposite sign, as an odd multisine after half its period; None if there are fewer than two.
 
-    Of a few tones alone, like a sine, nothing is said: their half periods tell no more than windows do.
+    None also for an input of a few tones, like a sine: for these half periods are no better than windows.
     """
     signal = u - u.mean()
     number, power = signal.shape[0], float(np.dot(signal, signal))
@@ -60,17 +60,17 @@ def find_half_period(u: FloatArray, shortest: int = 16) -> int | None:
 
 
 def one_more(u: FloatArray, y: FloatArray, period: int) -> tuple[FloatArray, FloatArray]:
-    """Input and output (n,) of a periodic input with the sample that follows, by what followed a period before: the last difference needs it."""
+    """Periodic input and its output (n,) with one more sample, extrapolated from the period before: the last difference needs it."""
     if u.shape[0] <= period:
         return u, y
     return np.append(u, u[-period]), np.append(y, y[-1] + y[-period] - y[-period - 1])
 
 
 def half_periods(u: FloatArray, y: FloatArray, half: int, differenced: bool = True) -> list[tuple[int, FloatArray, FloatArray]]:
-    """Each half period of input and output (n,) followed by its own negative: a whole period, in which nothing leaks.
+    """(counter, input, output) of each half period (n,) followed by its negative: a whole period without leakage.
 
-    differenced: by the steps of the output, and with one sample more, as its differences need it
-    The first is left out where more than two remain. Each is numbered as if they followed each other.
+    differenced: True to negate the steps of the output instead, with one more sample for its differences
+    The first is left out if there are more than two. Counters are those of consecutive periods.
     """
     if not differenced:
         count = y.shape[0] // half
@@ -89,25 +89,25 @@ def half_periods(u: FloatArray, y: FloatArray, half: int, differenced: bool = Tr
 
 
 def _odd_lines(part: FloatArray) -> FloatArray:
-    """Sizes of the odd lines of a period that is this part (n,) and its negative."""
+    """Magnitudes of the odd lines of the period that consists of this part (n,) and its negative."""
     return np.asarray(np.abs(scipy.fft.rfft(np.concatenate((part, -part))))[1::2])
 
 
 def _whole(signal: FloatArray, period: int) -> bool:
-    """Whether the true period, by a parabola through the likeness of its neighbours, is this whole number of samples."""
+    """Whether the true period, by a parabola through the correlations at neighbouring lags, is this whole number of samples."""
     before, here, after = (likeness(signal, period + shift) for shift in (-1, 0, 1))
     bend = before - 2.0 * here + after
     return bend < 0.0 and abs(0.5 * (before - after) / bend) < OFF_WHOLE
 
 
 def likeness(signal: FloatArray, lag: int) -> float:
-    """Correlation of a (n,) signal of mean 0 with itself, lag samples later."""
+    """Correlation of a (n,) signal of mean 0 with itself ``lag`` samples later."""
     a, b = signal[:-lag], signal[lag:]
     return float(np.dot(a, b) / np.sqrt(np.dot(a, a) * np.dot(b, b)))
 
 
 def period_note(u: FloatArray, period: int) -> list[str]:
-    """What to say about a period that the user gives: it need not repeat perfectly, but it must lie in the (n,) input.
+    """Notes on a period given by the user, samples: one if the (n,) input does not repeat after it.
 
     Raises BadInput for a period longer than the input.
     """

@@ -1,7 +1,7 @@
 """Running auto and cross spectra: add a window, forget, or slide.
 
-Gxx, Gyy, Gyx are sums over windows of |X|^2, |Y|^2 and Y conj(X); the scale to a power spectral density is left out, as
-it cancels in the frequency response. (Welch 1967; Bendat & Piersol, Random Data, 4th ed., sec. 11.5)
+Gxx, Gyy, Gyx are sums over windows of |X|^2, |Y|^2 and Y conj(X), without the scale to a power spectral density, which
+cancels in the frequency response. (Welch 1967; Bendat & Piersol, Random Data, 4th ed., sec. 11.5)
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from xy_sysid.response.windows import LINES_APART, Window, WindowShape, error_co
 from xy_sysid.samples.block import FloatArray
 
 State = dict[str, NDArray[Any]]
-SUMS = 16  # partial sums of a mean: less rounding, and they run side by side
+SUMS = 16  # partial sums of a mean: less rounding, and they run in parallel
 
 
 @dataclass(frozen=True, slots=True)
 class WindowSpectrum:
-    """Spectra of one axis in one window: gxx, gyy (lines,), gyx (lines,) complex, and the window's place on the grid."""
+    """Spectra of one axis in one window: gxx, gyy (lines,), gyx (lines,) complex, and the window's index on the grid."""
 
     index: int
     gxx: FloatArray
@@ -40,8 +40,8 @@ class Spectra:
     gxx, gyy:  (lines,) real
     gyx:       (lines,) complex
     weight:    sum of the windows' weights
-    quadratic: (LINES_APART,) sum over pairs of windows of weight_i weight_j correlation_ij(lines apart): it carries
-               the effective number of averages, weight^2 / quadratic[0], whatever the overlap, gaps and forgetting
+    quadratic: (LINES_APART,) sum over pairs of windows of weight_i weight_j correlation_ij(lines apart); it gives the
+               effective number of averages, weight^2 / quadratic[0], for any overlap, gaps and forgetting
     """
 
     gxx: FloatArray
@@ -52,13 +52,13 @@ class Spectra:
 
     @property
     def averages(self) -> float:
-        """Effective number of independent windows; 0 when there is none."""
+        """Effective number of independent windows; 0 without any."""
         return float(self.weight**2 / self.quadratic[0]) if self.weight > 0 else 0.0
 
 
 @compiled
 def mean(values: FloatArray) -> float:
-    """Of (n,) values."""
+    """Mean of (n,) values."""
     sums, total = np.zeros(SUMS), 0.0
     for i in range(0, values.shape[0] - SUMS + 1, SUMS):
         for k in range(SUMS):
@@ -84,7 +84,7 @@ def _tapered(values: FloatArray, taper: FloatArray) -> FloatArray:
 
 
 class Transformer:
-    """Turns windows of samples into spectra: mean removed, tapered, position differenced if asked."""
+    """Turns windows of samples into spectra: mean removed, tapered, position differenced if requested."""
 
     def __init__(self, shape: WindowShape, differenced: bool) -> None:
         self.shape = shape
@@ -111,10 +111,10 @@ def _power(z: ComplexArray) -> FloatArray:
 
 
 class RunningSpectra:
-    """update(window) and get(): everything, exponentially forgotten, or the newest few windows."""
+    """update(window) and get(): sums over all windows, with exponential forgetting, or over the newest few."""
 
     def __init__(self, shape: WindowShape, forget: float = 1.0, sliding: int = 0) -> None:
-        """forget: factor on what is there for each new window, 1 forgets nothing; sliding: keep so many windows, 0 all."""
+        """forget: factor on the old sums for each new window, 1: none; sliding: number of windows to keep, 0: all."""
         self.lines = shape.length // 2 + 1
         self.sliding = sliding
         self._forget = forget
@@ -128,7 +128,7 @@ class RunningSpectra:
         return Spectra(gxx=zero, gyy=zero.copy(), gyx=zero.astype(np.complex128), weight=0.0, quadratic=np.zeros(LINES_APART))
 
     def update(self, window: WindowSpectrum) -> None:
-        """Take one more window."""
+        """Add one window."""
         if self.sliding:
             self._kept.append(window)
         else:
@@ -145,7 +145,7 @@ class RunningSpectra:
         return total
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Delete all windows."""
         self._kept.clear()
         self._recent = []
         self._sum = self._empty()
@@ -167,7 +167,7 @@ class RunningSpectra:
         )
 
     def state(self) -> State:
-        """Everything needed to go on later, as arrays."""
+        """The state as arrays, to continue later."""
         kept = list(self._kept)
         empty = np.zeros((0, self.lines))
         return {
@@ -184,7 +184,7 @@ class RunningSpectra:
         }
 
     def restore(self, state: State) -> None:
-        """Go on from a state of the same shape."""
+        """Continue from a state of the same shape."""
         self._sum = Spectra(
             gxx=np.real(state["gxx"]), gyy=np.real(state["gyy"]), gyx=np.asarray(state["gyx"], dtype=np.complex128),
             weight=float(np.real(state["weight"][0])), quadratic=np.real(state["quadratic"]),

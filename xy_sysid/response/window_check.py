@@ -1,4 +1,4 @@
-"""Is a window of samples fit to be used? What no counter shows: an encoder that stands still or leaps."""
+"""Can a window of samples be used? Faults that no counter shows: an encoder that stands still or jumps."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from xy_sysid.samples.block import FloatArray
 Piece = tuple[int, FloatArray, FloatArray]
 """Counter of the first sample, input (n,), output (n,) of a gap-free stretch."""
 
-CREST_FACTOR = 10.0  # a step of the encoder counts as a leap when it stands out so many times more than the voltage does
-OFTEN = 0.1  # of the samples; an encoder that changes less often than that is broken rather than held
-CREST_USUAL = 4.0  # crest factor that any noise reaches in a few thousand samples
+CREST_FACTOR = 10.0  # a step of the encoder counts as a jump if its crest factor is this many times that of the voltage
+OFTEN = 0.1  # of the samples; an encoder that changes less often is broken and not held by friction
+CREST_USUAL = 4.0  # crest factor of any noise over a few thousand samples
 
 HELD = (
     "In every window the output stands still at times while the input moves: friction holds it. "
@@ -31,11 +31,11 @@ ACTS = {
     "level": "A response needs an input that changes within a window; steps between recordings or stretches are for xy-sysid steps.",
     "even": "Choose another output with --map.",
 }
-STILL, EVEN = 1e-9, 1e-12  # of a signal's size: an input (as resampled) or a speed that changes by less is rounding; no converter has 30 bits
+STILL, EVEN = 1e-9, 1e-12  # of a signal's size: smaller changes of the input (resampled) or the speed are rounding; no converter has 30 bits
 
 
 def stands_still(voltage: FloatArray, position: FloatArray, frozen: int) -> bool:
-    """Whether the position (n,) keeps one value for ``frozen`` samples after the voltage (n,) has moved."""
+    """Whether the position (n,) is constant for ``frozen`` samples after the voltage (n,) has changed."""
     edges = np.concatenate(([0], np.flatnonzero(np.diff(position) != 0) + 1, [position.shape[0]]))
     for run in np.flatnonzero(np.diff(edges) >= frozen):
         begin, end = int(edges[run]), int(edges[run + 1])
@@ -47,8 +47,8 @@ def stands_still(voltage: FloatArray, position: FloatArray, frozen: int) -> bool
 def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str | None:
     """The reason (a key of REASONS) not to use this window of one axis, or None.
 
-    frozen: samples of standstill that are too many. A leap is a step whose ratio to the rms step is ten times what the
-    voltage's own crest factor suggests (an impulse has a large one, so its answer is not a leap).
+    frozen: samples of standstill that count as a fault. A jump is a step whose ratio to the rms step is ten times the crest
+    factor of the voltage (which is large for an impulse, so the response to it is no jump).
     """
     if stands_still(voltage, position, frozen):
         return "frozen"
@@ -63,28 +63,28 @@ def window_fault(voltage: FloatArray, position: FloatArray, frozen: int) -> str 
 
 
 def silent(voltage: FloatArray, position: FloatArray) -> str | None:
-    """The reason (a key of SILENT) why a window tells nothing of a response: input or speed do not change in it by more than rounding."""
+    """The reason (a key of SILENT) why a window has no information on a response: input or speed is constant up to rounding; None if it has."""
     if float(np.ptp(voltage)) <= STILL * float(np.max(np.abs(voltage))):
         return "level"
     return "even" if float(np.ptp(np.diff(position))) <= EVEN * float(np.max(np.abs(position))) else None
 
 
 def _resumes(voltage: FloatArray, position: FloatArray) -> bool:
-    """Whether a position (n,) that stands at times moves often, at the beginning and at the end too: friction holds it, and no encoder died."""
+    """Whether a position (n,) with rests moves often, also at the beginning and the end: then friction holds it, and the encoder works."""
     moves = np.diff(position) != 0.0
     quarter = max(moves.shape[0] // 4, 1)
     return bool(moves.mean() > OFTEN and moves[:quarter].any() and moves[-quarter:].any() and float(np.ptp(voltage)) > 0.0)
 
 
 def stretches(pieces: list[Piece], shape: WindowShape, differenced: bool, frozen: int) -> tuple[list[tuple[int, int, int]], list[str]]:
-    """(number of the piece, first sample, last sample + 1) of what holds windows without a fault, and a sentence about those left out.
+    """(number of the piece, first sample, last sample + 1) of parts with faultless windows, and a sentence about those left out.
 
-    differenced: a window needs one sample more. Raises BadInput if every window has a fault or is silent.
+    differenced: True if a window needs one more sample. Raises BadInput if every window has a fault or is silent.
     """
     kept: list[tuple[int, int, int]] = []
-    held: list[tuple[int, int, int]] = []  # windows that stand at times and go on
+    held: list[tuple[int, int, int]] = []  # windows with rests that move again
     faults: dict[str, int] = {}
-    says: list[str | None] = []  # of each window without a fault, why it tells nothing
+    says: list[str | None] = []  # the result of ``silent`` for each window without a fault
     total = 0
     for number, (seq, u, y) in enumerate(pieces):
         follows = False

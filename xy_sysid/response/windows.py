@@ -1,7 +1,7 @@
-"""Cut gap-free samples into overlapping windows, and what a window does to an estimate.
+"""Overlapping windows of gap-free samples, and the effect of a window on an estimate.
 
-Windows lie on a grid of the sample counter (multiples of the hop), so that the same samples give the same windows in
-any chunking, and an observer that starts late sees the same windows as one that was there before.
+Windows start at multiples of the hop of the sample counter, so that the same samples give the same windows in any chunking, also
+for a node that starts later.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray, Samples
 
-KERNEL_TAIL = 2e-5  # share of the window's power that may be cut off the blur kernel
-KERNEL_MOST = 64  # half lines to each side at the most (a boxcar's tail never ends)
+KERNEL_TAIL = 2e-5  # part of the window's power that may be cut from the smoothing kernel
+KERNEL_MOST = 64  # most half lines to each side (the tail of a boxcar is infinite)
 LINES_APART = 5  # errors of lines further apart count as independent (Hann: correlation 1/36 two lines apart, 0 beyond)
-COSINES = {  # parts of the cosines of order 0, 1, ... of each taper (D'Antona & Ferrero, Digital Signal Processing for Measurement Systems, 2006)
+COSINES = {  # factors of the cosines of order 0, 1, ... of each taper (D'Antona & Ferrero, Digital Signal Processing for Measurement Systems, 2006)
     "hann": (0.5, 0.5),
     "hamming": (0.54, 1.0 - 0.54),
     "blackman": (0.42, 0.50, 0.08),
@@ -44,7 +44,7 @@ class WindowShape:
         return cls(name, length, hop)
 
     def taper(self) -> FloatArray:
-        """(length,) periodic taper, bit for bit that of scipy.signal.get_window, which takes half a second to import; not to be written to."""
+        """(length,) periodic taper, read-only, bit for bit that of scipy.signal.get_window, whose import takes half a second."""
         return _taper(self.name, self.length)
 
 
@@ -61,10 +61,10 @@ def _taper(name: str, length: int) -> FloatArray:
 
 
 def blur_kernel(shape: WindowShape) -> FloatArray:
-    """(2 j + 1,) weights at half-line steps, centred: how the window blurs the response of a locally white input.
+    """(2 j + 1,) weights at half-line steps, centred: the smoothing of the response by the window, for a locally white input.
 
     E[Y conj(X)] / E|X|^2 = sum over lags of g(lag) r(lag)/r(0), with r the window's autocorrelation: the response
-    convolved with |W(f)|^2, which 2 L points hold exactly as r is shorter than 2 L. (Bendat & Piersol, 4th ed., sec. 11.5)
+    convolved with |W(f)|^2, which 2 L points represent exactly as r is shorter than 2 L. (Bendat & Piersol, 4th ed., sec. 11.5)
     """
     power = np.abs(np.fft.fft(shape.taper(), 2 * shape.length)) ** 2
     power /= power.sum()
@@ -101,10 +101,10 @@ def error_correlation(shape: WindowShape) -> FloatArray:
 class Window:
     """One window of samples.
 
-    index:    its place on the grid; it starts at sample index * hop
+    index:    on the grid; the window starts at sample index * hop
     voltage:  (length, axes)
-    position: (length + extra, axes), extra = 1 where the position is to be differenced
-    reference: (length, axes) where the windows hold one, else (length, 0)
+    position: (length + extra, axes), extra = 1 if the position is differenced
+    reference: (length, axes) if the windows have one, otherwise (length, 0)
     """
 
     index: int
@@ -114,10 +114,10 @@ class Window:
 
 
 class Windower:
-    """Feeds on runs of samples, gives windows; a step in the counter ends a run and what it had not filled."""
+    """Takes runs of samples, and returns windows; a step in the counter ends a run, and its unused samples are dropped."""
 
     def __init__(self, shape: WindowShape, axes: int, extra: int, reference: bool = False) -> None:
-        """extra: samples of position that a window needs more; reference: whether samples come with one, and windows hold it."""
+        """extra: additional samples of position in a window; reference: whether samples and windows have one."""
         self.shape = shape
         self._extra = extra
         self._axes = axes
@@ -147,11 +147,11 @@ class Windower:
         return found
 
     def pending(self) -> int:
-        """Samples heard that no window has used yet."""
+        """Number of samples that wait for the next window."""
         return self._filled
 
     def reset(self) -> None:
-        """Forget the samples that wait for a full window."""
+        """Drop the samples that wait for a full window."""
         self._filled = 0
 
     def _append(self, samples: Samples) -> None:

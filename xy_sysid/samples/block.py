@@ -1,4 +1,4 @@
-"""A block of consecutive samples, as it travels in one std_msgs/Float64MultiArray.
+"""A block of consecutive samples, as in one std_msgs/Float64MultiArray.
 
 Rows are samples; columns are ``seq,time`` and then one per axis. This file does not depend on ROS: a message is its column names
 and its numbers.
@@ -26,7 +26,7 @@ class Block:
     """Consecutive samples of one quantity.
 
     axes:   names of the axes, one per column of ``values``
-    seq:    (n,) sample counter since the source started, whole numbers
+    seq:    (n,) sample counter since the start of the source, whole numbers
     time:   (n,) sample instants, s
     values: (n, axes), V or m
     """
@@ -51,7 +51,7 @@ class Samples:
     seq:      counter of the first
     voltage:  (n, axes)
     position: (n, axes)
-    time:     (n,) stamps of the position, s, where they are known
+    time:     (n,) stamps of the position, s, if they are known
     reference: (n, axes) the controller's reference at that time, if requested
     """
 

@@ -1,7 +1,7 @@
 """Velocity to position: a position whose mean velocity from each sample to the next equals the measured one, so that noise stays white.
 
-A value measured at an instant then counts for the following step. Therefore a delay that is found from it contains half a sample (a full
-one if the drive itself differences its encoder over the last sample); ``integrated`` says so.
+A value measured at an instant then counts for the following step. Therefore an estimated delay contains half a sample (a full one if the
+drive itself differences its encoder over the last sample); ``integrated`` says so.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def integral(values: FloatArray, lasting: FloatArray, start: FloatArray | float 
 
 
 def detrended(values: FloatArray) -> FloatArray:
-    """(n,) without their straight line."""
+    """(n,) values minus their straight line."""
     if values.size < 3:
         return values
     line = np.column_stack((np.ones(values.size), np.arange(values.size) / values.size))

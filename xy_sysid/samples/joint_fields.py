@@ -1,4 +1,4 @@
-"""The fields of a joint state that are used (sensor_msgs/JointState), and why a message is not usable.
+"""The used fields of a joint state (sensor_msgs/JointState), and the reason why a message is not usable.
 
 Drivers leave unknown fields empty or fill them with NaN: often the position of a wheel, and the effort of many drives.
 """
@@ -21,7 +21,7 @@ INSTEAD: dict[JointField, JointOutput] = {"position": "velocity", "velocity": "p
 
 
 def joints_of(axes: tuple[str, ...], entries: tuple[str, ...]) -> dict[str, str]:
-    """The joint of each axis, from entries like ``x=shoulder_pan_joint``; an axis without one is named like its joint.
+    """The joint of each axis, from entries like ``x=shoulder_pan_joint``; an axis without an entry has the name of its joint.
 
     Raises BadInput for an invalid entry, an unknown axis, and a joint or an axis named twice.
     """
@@ -47,15 +47,15 @@ class JointMessage(Protocol):
 
     @property
     def position(self) -> Sequence[float]:
-        """Of each joint, m or rad."""
+        """Position of each joint, m or rad."""
 
     @property
     def velocity(self) -> Sequence[float]:
-        """Of each joint, m/s or rad/s."""
+        """Velocity of each joint, m/s or rad/s."""
 
     @property
     def effort(self) -> Sequence[float]:
-        """Of each joint, N or N m."""
+        """Effort of each joint, N or N m."""
 
 
 class JointReader:
@@ -66,10 +66,10 @@ class JointReader:
         self._axis, self._names = next(iter(joints)), tuple(joints.values())
         self._wanted: tuple[JointField, ...] = (output, "effort") if effort else (output,)
         self._heard = False
-        self._known: set[JointField] = set()  # fields that have had numbers for all joints; a later NaN is a fault of single samples
+        self._known: set[JointField] = set()  # fields that had numbers for all joints; a later NaN is a fault of a single sample
 
     def of_others(self, message: JointMessage) -> bool:
-        """True if it only has other joints while ours have been received: several publishers may share the topic, for example for a gripper."""
+        """True if a message has only other joints after ours have been received: other publishers, as of a gripper, may share the topic."""
         ours = not set(self._names).isdisjoint(message.name)
         self._heard = self._heard or ours
         return self._heard and not ours

@@ -17,20 +17,20 @@ from xy_sysid.samples.joint_fields import JointOutput
 from xy_sysid.samples.ring import RATE_SAMPLES
 from xy_sysid.samples.stamp_counter import FOLLOW, StampCounter
 
-RESTART = 1.0  # s that a stamp must go back to count as a restart of the source
-APART = 1.0  # s between the newest stamps of voltage and joint states above which they are not from one clock
+RESTART = 1.0  # s by which a stamp goes back at a restart of the source
+APART = 1.0  # s between the newest stamps of voltage and joint states, above which their clocks differ
 ANCHORS = 20  # samples of voltage for the first estimate of the rate
 SAME_RATE = 0.01  # relative difference allowed between the rates of voltage and joint states, estimated from 200 jittering stamps
 CATCHING_UP = 0.2  # relative difference allowed between the step over long stretches and the median step
-LOOK, FEW_LOOK, MANY_LOOK = 2.0, RATE_SAMPLES // 2, 40_000  # s of stamps, and least and greatest number, after which the rate is checked again
+LOOK, FEW_LOOK, MANY_LOOK = 2.0, RATE_SAMPLES // 2, 40_000  # s of stamps, and least and largest number, between two checks of the rate
 OTHER_RATE = 1.01  # factor by which their counted and their mean step must both differ: losses change only the mean, bursts only the count
-COUNTED = 3  # iterations in which the counting step becomes that of the line through the stamps
+COUNTED = 3  # iterations of the step: stamps are counted with it, and a line through them gives the next
 STICKS = 0.8  # samples by which a sample may deviate from its voltage sample before it is assigned to another
 STILL = 20  # consecutive messages with one stamp after which they count as unstamped
 
 
 def counted_step(times: FloatArray) -> float:
-    """s between samples, by a straight line through stamps counted by the usual step: losses and jitter do not change it, bursts do."""
+    """Step between samples, s, by a straight line through stamps counted with the usual step: losses and jitter do not change it, bursts do."""
     step = float(np.median(np.diff(times)))
     for _ in range(COUNTED):
         count = _counted(times, step)
@@ -41,7 +41,7 @@ def counted_step(times: FloatArray) -> float:
 
 @compiled
 def _counted(times: FloatArray, step: float) -> FloatArray:
-    """Number of each stamp, on an even time grid that follows the stamps slowly: jitter does not accumulate."""
+    """Number of each stamp, on an even time grid that follows the stamps slowly, so that jitter does not accumulate."""
     count = np.zeros(times.shape[0])
     instant = times[0]
     for k in range(1, times.shape[0]):
@@ -53,7 +53,7 @@ def _counted(times: FloatArray, step: float) -> FloatArray:
 
 
 def usual_step(times: FloatArray) -> float:
-    """s between samples: the counted step, or the step of a straight line if most cycles only catch up after a delay."""
+    """Step between samples, s: the counted step, or that of a straight line if most cycles only catch up after a delay."""
     times = times[np.concatenate(([True], np.diff(np.maximum.accumulate(times)) > 0))]
     far = max(len(times) // 4, 1)
     step, mean = float(np.median(np.diff(times))), float(np.median(times[far:] - times[:-far])) / far

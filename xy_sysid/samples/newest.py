@@ -47,7 +47,7 @@ class Newest:
     """feed(kind, block), then ``newest``: the same blocks in any order of arrival give the same samples."""
 
     def __init__(self, axes: tuple[str, ...], memory: float, minimum: float, reorder: float) -> None:
-        """memory: s that are kept; minimum: length in s of a run before it replaces an earlier, longer one."""
+        """memory: s to keep; minimum: duration in s from which a run replaces an earlier, longer one."""
         self.axes = axes
         self.total = 0
         self._memory, self._minimum = memory, minimum
@@ -91,7 +91,7 @@ class Newest:
 
     @property
     def seconds(self) -> float:
-        """Length of the samples that ``newest`` would return."""
+        """Duration of the samples that ``newest`` would return, s."""
         return self._best().size / self.sampling_rate if self.sampling_rate else 0.0
 
     def lacking(self) -> str:

@@ -1,7 +1,7 @@
 """Pairs voltage and position by sample counter, in any order of arrival, and reports faults of the streams.
 
-Both streams are stored in rings indexed by the counter. Samples that are in both rings are returned, in
-order. Samples that are missing for longer than the reorder time become a gap.
+Both streams are stored in rings indexed by the counter. Samples in both rings are returned, in order. Samples that are missing for
+longer than the reorder time become a gap.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ Quantity = Literal["voltage", "position"]
 QUANTITIES: tuple[Quantity, Quantity] = ("voltage", "position")
 
 LOOK_AGAIN = 5 * RATE_SAMPLES  # blocks of unequal rates after which both are estimated again
-RATE_TOLERANCE = 1e-3  # two streams, or one before and after a restart, have the same rate within this
-TIME_TOLERANCE = 1.5  # samples by which a time stamp may deviate before that counts as a jump
-REORDER_UNKNOWN = 1000  # samples a block may be late while the rate is unknown
+RATE_TOLERANCE = 1e-3  # relative difference up to which two streams, or a stream before and after a restart, have the same rate
+TIME_TOLERANCE = 1.5  # samples by which a time stamp may deviate without a jump
+REORDER_UNKNOWN = 1000  # samples by which a block may be late while the rate is unknown
 RESTART_BLOCKS = 2  # consecutive old blocks that count as a restart of the source
 
 REASONS = {
@@ -53,7 +53,7 @@ class Pairer:
     """feed(kind, block) -> paired samples and gaps, in order of the counter."""
 
     def __init__(self, axes: tuple[str, ...], reorder: float, capacity: int = 1 << 15) -> None:
-        """reorder: seconds by which a block may be late; capacity: samples that one stream may be ahead of the other."""
+        """reorder: s by which a block may be late; capacity: samples by which one stream may be ahead of the other."""
         self.axes = axes
         self.counts: Counter[str] = Counter()
         self.said: dict[str, str] = {}
@@ -169,7 +169,7 @@ class Pairer:
         return good
 
     def _check_time(self, kind: Quantity, ring: Ring, seq: NDArray[np.int64], time: FloatArray) -> NDArray[np.bool_]:
-        """Compare time with the counter: a lasting deviation cuts a run, invalid times are refused."""
+        """(n,) usable samples by their times: a jump of time against the counter cuts a run, invalid times are refused."""
         good = np.asarray(np.isfinite(time), dtype=np.bool_)
         if ring.rate is not None and bool(good.any()):
             offset = time - seq / ring.rate
@@ -235,7 +235,7 @@ class Pairer:
         return found
 
     def _all_known_bad(self, length: int) -> bool:
-        """True if the missing samples are known to be invalid, so that waiting is useless."""
+        """True if all missing samples are known to be invalid, so that waiting is useless."""
         start = self._next or 0
         return length > 0 and all(start + i in self._bad for i in range(length))
 

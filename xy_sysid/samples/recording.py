@@ -17,7 +17,7 @@ from xy_sysid.units import OF, SCALES, Sensed, Units
 
 STANDS = 0.02  # of the longest distance within a second: an axis with less motion and no drive counts as at rest
 COMPARABLE = 0.5  # of the longest stretch; shorter ones contain too few of its windows
-MOST_STRETCHES = 24  # stretches that are analysed together, at most
+MOST_STRETCHES = 24  # most stretches that are analysed together
 SLOWEST = 3.0  # Hz; a lower rate is not a machine axis but a wrong time unit
 SAME_RATE = 1e-3  # relative; sampling rates that differ by more do not belong together
 
@@ -124,10 +124,10 @@ class Recording:
     time:          (n,) sample instants, s
     voltage:       (n, axes) input in ``input_unit``, held from its instant to the next
     position:      (n, axes) output in ``output_unit`` at its instant
-    reference:     (n, axes) the commanded position where the file has one (a sign of closed loop), else None
-    notes:         what was converted or assumed while reading, one sentence each
-    measured:      what the sensor reads; ``position`` is the integral of a velocity or an acceleration
-    machine:       its name from the meta data of the file, else empty
+    reference:     (n, axes) the commanded position if the file has one (a sign of closed loop), otherwise None
+    notes:         conversions and assumptions in reading, one sentence each
+    measured:      quantity of the sensor; ``position`` is the integral of a velocity or an acceleration
+    machine:       its name in the metadata of the file, otherwise empty
     """
 
     sampling_rate: float
@@ -245,7 +245,7 @@ class Recording:
         return self._within(axis, max(self.runs(), key=_size))
 
     def stretches(self, axis: str) -> tuple[Run, ...]:
-        """All stretches of one axis without a gap that are at least half as long as the longest, in their order; if they are many, the longest.
+        """All stretches of one axis without a gap that are at least half as long as the longest, in their order; at most ``MOST_STRETCHES``.
 
         Each without idle ends (no drive, no motion). Raises BadInput as ``run``.
         """
@@ -292,9 +292,9 @@ class Recording:
 
 
 def as_sensed(position: FloatArray, sampling_rate: float, measured: Sensed) -> FloatArray:
-    """The output as its sensor reads it, from the position (n,) that it was integrated to: (n,), (n - 1,) or (n - 2,) samples.
+    """The output as its sensor reads it, from the integrated position (n,): (n,), (n - 1,) or (n - 2,) samples.
 
-    The inverse of ``samples.integral``, so a velocity comes back as it was measured, an acceleration without its mean and slow drift.
+    The inverse of ``samples.integral``: a velocity as it was measured, an acceleration without its mean and slow drift.
     """
     order = {"position": 0, "velocity": 1, "acceleration": 2}[measured]
     return np.asarray(np.diff(position, n=order) * sampling_rate**order) if order else position

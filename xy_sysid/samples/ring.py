@@ -1,7 +1,7 @@
 """One stream of samples, stored by its counter modulo a capacity, so that blocks may arrive in any order.
 
-A block without a fault that continues the previous one is stored by one compiled loop: at 2 kHz in
-blocks of 20 that is the usual case, a hundred times a second.
+A block without a fault that continues the previous one is stored by one compiled loop: this is the usual case, a hundred times a
+second at 2 kHz in blocks of 20.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from xy_sysid.samples.recording import rate_from_time
 
 RATE_SAMPLES = 200  # samples of one stream for the estimate of its rate
 DRIFT = 0.01  # of a period per sample, over DRIFT_SECONDS: above this the rate has changed
-DRIFT_SECONDS, DRIFT_SAMPLES = 5.0, 10 * RATE_SAMPLES  # this many samples are enough; half as many show twice the drift
+DRIFT_SECONDS, DRIFT_SAMPLES = 5.0, 10 * RATE_SAMPLES  # the shorter of the two is used
 
 Counters = NDArray[np.int64]
 
@@ -26,7 +26,7 @@ class Ring:
 
     tag: (capacity,) the counter of the stored sample, -1 for none; value: (capacity, axes); time: (capacity,) stamps, s
     newest: the highest counter, -1 before the first; rate: Hz, None until it is estimated
-    offset: s, time of the newest sample less its counter over the rate
+    offset: s, time of the newest sample minus its counter over the rate
     behind, behind_next: number of consecutive old blocks, and the counter with which the next would continue
     jumping: number of consecutive samples whose time does not match their counter
     """
@@ -47,9 +47,9 @@ class Ring:
         self._times: list[FloatArray] = []
 
     def follow(self, block: Block, least: int, tolerance: float) -> bool:
-        """Store a block that starts right after the newest sample and has no fault; for any other block return False without a change.
+        """Store a block that continues the newest sample and has no fault; for any other block return False without a change.
 
-        least: counter from which on samples are still wanted; tolerance: samples by which a time may leave its place
+        least: lowest counter that is still needed; tolerance: samples by which a time may deviate
         """
         if self.rate is None or self.offset is None or block.values.shape != (len(block), self.value.shape[1]):
             return False
@@ -105,7 +105,7 @@ class Ring:
         return self._copy(self.value, first, last)
 
     def stamps(self, first: int, last: int) -> FloatArray:
-        """(last - first,) their stamps, s."""
+        """(last - first,) a copy of the stored stamps, s."""
         return self._copy(self.time, first, last)
 
     def _copy(self, store: FloatArray, first: int, last: int) -> FloatArray:
@@ -138,13 +138,13 @@ class Ring:
 
 
 def shared(one: Ring, other: Ring, first: int, last: int) -> int:
-    """How many samples from counter ``first`` on, at the most to ``last``, both rings hold without a hole."""
+    """Number of consecutive samples from counter ``first`` to before ``last`` that both rings have."""
     return int(_shared(one.tag, other.tag, first, last))
 
 
 @compiled
 def _faultless(seq: FloatArray, time: FloatArray, values: FloatArray, first: int, rate: float, offset: float, tolerance: float) -> bool:
-    """Whether the counter goes on by ones from ``first``, the time with it, and every value is a number."""
+    """Whether the counter increases by 1 from ``first``, the time follows it, and every value is finite."""
     before = offset
     for i in range(seq.shape[0]):
         now = time[i] - seq[i] / rate

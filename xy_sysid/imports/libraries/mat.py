@@ -1,4 +1,4 @@
-"""MATLAB up to version 7, by scipy. Structs and cells are walked into: each leaf has a name like ``meas.Y(2).Data``."""
+"""MATLAB up to version 7, by scipy. Structs and cells are resolved into leaves with names like ``meas.Y(2).Data``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COMPRESSED = 15  # miCOMPRESSED, MAT-File Format, table 1-1
 
 
 def declared(path: str) -> int:
-    """Bytes that the variables of a version 5 file say they take when unpacked."""
+    """Unpacked size of the variables of a version 5 file, as it states, bytes; 0 for other files."""
     with open(path, "rb") as file:
         head = file.read(128)
         if len(head) < 128 or head[126:128] not in (b"IM", b"MI"):

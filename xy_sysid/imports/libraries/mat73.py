@@ -1,4 +1,4 @@
-"""MATLAB version 7.3, which is HDF5, by h5py. Leaves are named as those of older versions: ``meas.Y(2).Data``."""
+"""MATLAB version 7.3, which is HDF5, by h5py. Leaves are named as in older versions: ``meas.Y(2).Data``."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 
 DEEPEST = 24  # levels of structs in structs
 MOST = 20_000  # items of one cell or array of structs
-OWN = ("#refs#", "#subsystem#")  # where MATLAB keeps the contents of cells, and objects
+OWN = ("#refs#", "#subsystem#")  # groups in which MATLAB stores the contents of cells, and objects
 
 
 def declared(path: str) -> int:
-    """Bytes that all arrays take when unpacked."""
+    """Unpacked size of all arrays, bytes."""
     import h5py
 
     sizes: list[int] = []

@@ -1,4 +1,4 @@
-"""ASAM MDF (.mf4, .mdf, .dat of INCA), by asammdf. Every group of channels has a time of its own; values are physical ones."""
+"""ASAM MDF (.mf4, .mdf), by asammdf. Every group of channels has its own time; values are physical."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 
 
 def declared(path: str) -> int:
-    """Bytes of all columns when unpacked."""
+    """Unpacked size of all columns, bytes."""
     from pyarrow import parquet
 
     data = parquet.read_metadata(path)

@@ -1,4 +1,4 @@
-"""NI TDMS, by npTDMS. A waveform has its start and increment; other channels of a group have its column of times, if it has one."""
+"""NI TDMS, by npTDMS. A waveform has its start and increment; other channels have no times except as a column of their group."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 
 
 def leaves(path: str) -> Iterator[tuple[str, Any, str, str]]:
-    """Entries of numbers, with their instants; each number of an array is an entry of its own."""
+    """Entries of numbers, with their instants; each number of an array is a separate entry."""
     from wpiutil.log import DataLogReader
 
     reader = DataLogReader(path)
