@@ -46,7 +46,7 @@ class Sums:
 
 
 def check_sums(path: Path) -> Checked:
-    """"none" without checksums, "good" if they agree, "damaged" if the file is; raises BadRecording for an intact file with other messages.
+    """ "none" without checksums, "good" if they agree, "damaged" if the file is; raises BadRecording for an intact file with other messages.
 
     After a killed recorder the last second of messages is not checked, because it is not in the checksums.
     """
