@@ -1,4 +1,4 @@
-"""Motors that push a table across a gap, of a make that neither ``xy_sim`` nor the effects know: another contact, other steps in time."""
+"""Motors that move a table across a gap, independent of ``xy_sim`` and the effects: another contact, other time steps."""
 
 from __future__ import annotations
 
