@@ -62,7 +62,7 @@ def test_columns_of_bags_and_arrays(tmp_path: Path, kind: str) -> None:
 
 @pytest.mark.parametrize("command", ["frf", "fit", "compare", "diagnose", "validate", "refine", "study", "report"])
 def test_every_offline_command_has_the_same_options_of_reading(command: str) -> None:
-    """--map, --unit, --scale, --rate, --axis, --topic, --effort and --span, said once."""
+    """--map, --unit, --scale, --rate, --axis, --topic, --effort and --span are the same everywhere."""
     text = cli(command, "--help").out
     for option in ("--map WHAT=COLUMN", "--unit WHAT=UNIT", "--scale WHAT=FACTOR", "--rate HZ", "--axis", "--topic", "--effort", "--span"):
         assert option in text, option

@@ -66,7 +66,7 @@ def test_a_recording_that_was_moved_and_done_by_another_version_is_no_second_one
 
 
 def test_one_file_under_the_names_of_two_axes_is_two_recordings(tmp_path: Path) -> None:
-    """In whatever order they come."""
+    """In any order of arrival."""
     merged(tmp_path, [row("x.npz", file_sha256="same")])
     merged(tmp_path, [row("y.npz", file_sha256="same", axis="y")])
     assert table(tmp_path, "axis", "source") == [("x", "x.npz"), ("y", "y.npz")]

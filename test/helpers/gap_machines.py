@@ -68,7 +68,7 @@ def driven(machine: GapMachine, seed: int) -> tuple[FloatArray, FloatArray]:
 
 @compiled
 def _run(drive: FloatArray, numbers: FloatArray, steps: int, late: int) -> FloatArray:
-    """The position at each sample: explicit steps, each side stops within a step where it rubs. Hertz: stiff as said at the usual depth."""
+    """The position at each sample: explicit steps; friction stops each side within a step. Hertz: given stiffness at the typical depth."""
     gain, pole, share, guide, half, turn, damping, usual, motor_rubs, table_rubs = numbers
     reduced, table = share * (1.0 - share), 1.0 - share
     h, x, v, x2, v2, shown = STEP, 0.0, 0.0, 0.0, 0.0, np.empty(drive.size)

@@ -42,7 +42,7 @@ _count = itertools.count()
 def new_domain() -> int:
     """A DDS domain that no other test of this run, in any worker, and hardly one of another run, uses.
 
-    One in which no killed process of an earlier run has left its mailboxes: who comes after it writes into some that nobody reads.
+    It has no ports of killed processes of an earlier run, because a new participant would write into ports that nobody reads.
     """
     for _ in range(100 // WORKERS):
         domain = (RUN + next(_count) * WORKERS + WORKER) % 100 + 1

@@ -291,7 +291,7 @@ def test_numbers_beyond_any_unit_are_refused(tmp_path: Path) -> None:
 
 
 def a_slip(path: Path, kinds: tuple[str, ...], first: int = 1000, size: int = 1) -> Path:
-    """2000 samples; the counter of ``kinds`` slips at sample ``first``, while its time goes on."""
+    """2000 samples; the counter of ``kinds`` slips at sample ``first``, while its time continues."""
     messages = []
     for kind, content in both(range(0, 2000, 20)):
         slipped = kind in kinds and content.seq[0] >= first

@@ -68,7 +68,7 @@ def test_after_a_gap_the_longer_run_serves_until_the_new_one_will_do() -> None:
 
 
 def test_what_is_not_heard_is_named() -> None:
-    """Which stream, of which axes."""
+    """The error names the stream and its axes."""
     hearing = Newest(AXES, memory=100.0, minimum=3.0, reorder=0.1)
     assert "no voltage and no position of axes x, y received yet" in hearing.lacking()
     hearing.feed("voltage", Block(AXES, np.arange(20.0), np.arange(20.0) / 2000.0, np.zeros((20, 2))))

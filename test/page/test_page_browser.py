@@ -210,7 +210,7 @@ def test_wrong_use_is_answered_in_a_sentence(usual: Tab) -> None:
 
 
 def test_recordings_stand_side_by_side_and_a_lost_one_says_so(usual: Tab, server: Server) -> None:
-    """Opened from the list of the folder; when its process dies, the page says that it is closed, and the other goes on."""
+    """Opened from the list of the folder; if its process ends, the page says that it is closed, and the other continues."""
     one = ready(usual)
     before = set(server.children())
     chosen = one.page.get_by_role("combobox", name="recording")
