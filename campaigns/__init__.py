@@ -1,1 +1,1 @@
-"""Long measurements, commands of their own: bench (other software), blind (hidden machines), faults (attacks); pictures and documents."""
+"""Long measurements as separate commands: bench (other software), blind (hidden machines), faults (attacks); pictures and documents."""

@@ -1,4 +1,4 @@
-"""Where and when a campaign ran, for the page that it writes."""
+"""Place and date of a campaign, for the page that it writes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every test stands on."""
+"""Configuration of all tests."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from _pytest.faulthandler import fault_handler_stderr_fd_key
 if TYPE_CHECKING:
     from helpers.ros_tools import World
 
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # as commands and nodes set it: bit for bit, and quicker
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # as commands and nodes set it: reproducible bit for bit, and faster
     os.environ.setdefault(_name, "1")
 
 os.environ.setdefault("COLUMNS", "400")  # commands break lines at a terminal's width; a test finds a sentence in one line
 
-if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background: children would inherit deafness for Ctrl-C
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background: children would inherit the ignored Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-LIVE = (  # files that wait for nodes and browsers most of their time, the longest first
+LIVE = (  # files that mostly wait for nodes and browsers, the longest first
     "page/test_page_live.py",
     "nodes/test_node_commands.py",
     "page/test_page_browser.py",
@@ -51,14 +51,14 @@ LONG = [name for pair in zip(LIVE, COMPUTING, strict=True) for name in pair]
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """What a crash prints is seen, also after rclpy has turned it to what pytest captures."""
+    """The output of a crash is shown, also after rclpy has redirected it to the output that pytest captures."""
     from helpers import ros_tools
 
     ros_tools.CRASHES = config.stash[fault_handler_stderr_fd_key]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Long files first, one that waits and one that computes in turn; with several workers xdist puts files with many tests before them."""
+    """Long files first, alternating between waiting and computing ones; with several workers xdist starts with files of many tests."""
     root = Path(__file__).parent
     place = {name: number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.path.relative_to(root).as_posix(), len(place)))
@@ -66,7 +66,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def world(tmp_path: Path) -> Iterator[World]:
-    """A ROS domain of its own, in which every process ends with the test."""
+    """A separate ROS domain, in which every process ends with the test."""
     from helpers.ros_tools import world_in
 
     with world_in(tmp_path) as made:

@@ -1,4 +1,4 @@
-"""Every benchmark runs to its end: a little of each, with its figures looked at where they do not depend on the machine."""
+"""Every benchmark runs in its short form, with checks of the numbers that do not depend on the computer."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from campaigns.bench.tables import Table
 from xy_sysid.axis.model import AxisModel, simulate
 from xy_sysid.greybox.axis_data import prepare
 
-HERE = [name for name in TABLES if name != "live"]  # which starts processes that talk to each other
+HERE = [name for name in TABLES if name != "live"]  # which starts processes that communicate
 
 
 @cache
 def short(name: str) -> Table:
-    """The short form of a benchmark in this process; each is measured once."""
+    """The short form of a benchmark in this process; each runs once."""
     run: Callable[..., Table] = importlib.import_module(f"campaigns.bench.{name}").run
     return run(lambda line: None, short=True)
 
 
 @pytest.mark.parametrize("name", HERE)
 def test_a_benchmark_gives_its_table(name: str) -> None:
-    """A row for each thing measured, all of the same width, and figures against goals."""
+    """Rows of the same width, and numbers with goals."""
     table = short(name)
     assert table.rows and table.checks
     assert {len(row) for row in table.rows} == {len(table.columns)}
@@ -43,7 +43,7 @@ def test_a_benchmark_gives_its_table(name: str) -> None:
 
 
 def test_what_is_compared_is_equal() -> None:
-    """Times of different answers would say nothing: H1 is scipy's, and the cost is that of least_squares."""
+    """Compared programs give the same answers: H1 is that of scipy, and the cost that of least_squares."""
     for name, words in (("h1", "largest relative difference"), ("fit", "cost of xy_sysid")):
         (check,) = (check for check in short(name).checks if check.what.startswith(words))
         assert check.met, check
@@ -51,7 +51,7 @@ def test_what_is_compared_is_equal() -> None:
 
 @needs_ros
 def test_the_live_benchmark_gives_its_table() -> None:
-    """Nodes as processes: all samples that were sent are paired."""
+    """Nodes as processes: all sent samples are paired."""
     done = subprocess.run(
         [sys.executable, "-m", "campaigns.bench", "--short", "live"], cwd=ROOT, env=bare(), capture_output=True, text=True, timeout=300
     )
@@ -61,7 +61,7 @@ def test_the_live_benchmark_gives_its_table() -> None:
 
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_a_benchmark_that_is_asked_for_by_name_runs(name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """It prints what it measured, and writes no page."""
+    """It prints its results, and writes no page."""
     if name == "real_fits":
         monkeypatch.setenv("XY_SYSID_DATA", os.fspath(data("two_inertia_bench").parent))
     if name == "long_bag":  # measures the memory of its process
@@ -86,7 +86,7 @@ def test_a_benchmark_that_is_asked_for_by_name_runs(name: str, monkeypatch: pyte
 
 
 def test_peers_reach_the_axis_that_made_the_data() -> None:
-    """Output error to 1 %, inverse dynamics to a quarter (its low-pass blurs reversals); without friction both are twice as far off."""
+    """Output error within 1 %, inverse dynamics within 25 % (its low-pass smooths reversals); without friction both are twice as far off."""
     truth = AxisModel(0.1, 0.0, 20.0).with_effect("coulomb_friction", (0.3,))
     voltage = np.convolve(np.random.default_rng(2).normal(size=20_000), np.ones(20) / 4.0, "same")
     velocity = simulate(truth, 1000.0, voltage, np.zeros(voltage.size))
@@ -98,13 +98,13 @@ def test_peers_reach_the_axis_that_made_the_data() -> None:
 
 
 def test_a_table_takes_the_place_of_the_one_before() -> None:
-    """Between its marks; the rest of the page stays."""
+    """Between its marks; the rest of the page is unchanged."""
     page = "a\n\n<!-- made by python -m campaigns.bench peers -->\n\nold\n\n<!-- end of peers -->\n\nb\n"
     assert between(page, "peers", "new\n") == page.replace("old", "new")
 
 
 def test_every_benchmark_is_among_these() -> None:
-    """A new file of campaigns/bench/ has a short form, too."""
+    """A new file of campaigns/bench/ must have a short form, too."""
     files = {path.stem for path in (ROOT / "campaigns" / "bench").glob("*.py")} - {
         "__init__",
         "__main__",
@@ -119,7 +119,7 @@ def test_every_benchmark_is_among_these() -> None:
 
 
 def test_an_unknown_benchmark_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """With the names that there are."""
+    """The error lists the existing names."""
     monkeypatch.setattr("sys.argv", ["bench", "bag"])
     assert main() == 2
     assert capsys.readouterr().err.startswith("bench: bag is not a benchmark; there are h1, ")

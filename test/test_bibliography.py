@@ -1,4 +1,4 @@
-"""The bibliography holds every work that the code cites."""
+"""The bibliography contains every work that the code cites."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CITED = re.compile(rf"\(({SURNAME}(?:(?:, | & ){SURNAME})*),? ((?:19|20)\d\d)\b"
 
 
 def test_every_work_that_a_docstring_cites_by_author_and_year_is_listed() -> None:
-    """(Welch 1967), (Carter, Knapp & Nuttall 1973): all names stand in one entry, with the year."""
+    """(Welch 1967), (Carter, Knapp & Nuttall 1973): all names are in one entry, with the year."""
     entries = re.split(r"\n(?=- )", TEXT)
     found = {match.groups() for path in (ROOT / "xy_sysid").rglob("*.py") for match in CITED.finditer(path.read_text(encoding="utf-8"))}
     missing = [

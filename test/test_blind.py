@@ -1,4 +1,4 @@
-"""A short blind campaign: machines of the other physics code, with hidden base and hidden effects, and what is said of them."""
+"""A short blind campaign: machines of the independent physics code, with hidden base and effects, and their diagnosis."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def judged(*truth: str, seconds: float = SHORT) -> Judged:
 
 @pytest.mark.parametrize("name", ["coulomb_friction", "dead_zone", "gain_drift", "cogging", "amplifier_lag"])
 def test_a_hidden_effect_is_named(name: str) -> None:
-    """Alone, first, with confidence, and its held-out error is that of a fit that began at the truth."""
+    """Alone, first, with confidence, and its held-out error is that of a fit started at the truth."""
     found = judged(name)
     assert found.right, found
     assert found.effects == (name,)
@@ -49,7 +49,7 @@ def test_a_hidden_effect_is_named(name: str) -> None:
 
 
 def test_hidden_backlash_is_named_by_one_step_prediction() -> None:
-    """The innovation is at most 3.5 times the noise, the gap within 15 per cent."""
+    """The innovation is at most 3.5 times the noise, the gap within 15 %."""
     found = judged("backlash")
     assert found.effects == ("backlash",)
     assert found.ratio is not None
@@ -58,7 +58,7 @@ def test_hidden_backlash_is_named_by_one_step_prediction() -> None:
 
 
 def test_a_clean_axis_is_left_in_peace() -> None:
-    """Nothing is missing, and that is said."""
+    """Nothing is missing, and the answer says so."""
     found = judged()
     assert found.verdict == "nothing_missing"
     assert found.right
@@ -66,19 +66,19 @@ def test_a_clean_axis_is_left_in_peace() -> None:
 
 @pytest.mark.parametrize("name", OUTSIDE[1:])
 def test_what_no_hypothesis_describes_is_not_named(name: str) -> None:
-    """Not in the library is an answer, too."""
+    """Not in the library is a valid answer."""
     found = judged(name, seconds=10.0)
     assert not found.wrong, found
 
 
 def test_two_effects_are_both_named() -> None:
-    """Whichever is first."""
+    """In either order."""
     found = judged("cogging", "coulomb_friction", seconds=10.0)
     assert set(found.effects) == {"cogging", "coulomb_friction"} and found.right, found
 
 
 def test_development_and_reporting_draws_differ() -> None:
-    """No reporting machine was ever seen while tuning."""
+    """Reporting draws are different from development draws."""
     development, reporting = (Case("standard", ("cogging",), 3, draws).machine() for draws in ("development", "reporting"))
     assert development.spec.axes[0].drive != reporting.spec.axes[0].drive
     assert development.spec.axes[0].parts != reporting.spec.axes[0].parts
@@ -109,7 +109,7 @@ def test_draws_of_the_exact_sets_are_those_of_earlier_campaigns() -> None:
 @pytest.mark.parametrize("amount", [0.002, 0.01, 0.03])
 @pytest.mark.parametrize("number", [0, 1, 2, 3])
 def test_dirt_changes_the_motion_by_what_was_asked_for(amount: float, number: int) -> None:
-    """Within a tenth, on the axis without the effect, at its own fine steps and with the voltage that the case drives it with."""
+    """Within a tenth, on the axis without the effect, with its fine steps and the voltage of the case."""
     case = Case("test dirt", ("coulomb_friction",), number, "development", seconds=6.0, dirt=amount)
     machine = case.machine()
     assert FEWEST <= len(case.kinds) <= MOST and set(case.kinds) <= set(DIRT)
@@ -121,7 +121,7 @@ def test_dirt_changes_the_motion_by_what_was_asked_for(amount: float, number: in
 
 
 def test_dirt_is_the_same_again_and_another_on_every_axis() -> None:
-    """By the case alone; development and reporting draws differ; the axis beneath is the one without dirt."""
+    """Determined by the case alone; development and reporting draws differ; without the dirt the axis is the same."""
     case = Case("test dirt", (), 1, "development", seconds=5.0, dirt=0.01)
     again, other = (replace(case, number=number).machine().spec.axes[0].parts for number in (1, 2))
     first = case.machine().spec.axes[0].parts
@@ -133,7 +133,7 @@ def test_dirt_is_the_same_again_and_another_on_every_axis() -> None:
 
 
 def test_a_recording_is_simulated_once(tmp_path: Path) -> None:
-    """The second time it comes from the folder, bit for bit, with what can be seen in it; a damaged file is made anew."""
+    """The second time it is read from the folder, bit for bit, with its visibility; a damaged file is replaced."""
     case = Case("test dirt", ("constant_load",), 1, "development", seconds=5.0, dirt=0.01)
     first = recorded(case, tmp_path)
     path = tmp_path / file_name(case)
@@ -161,7 +161,7 @@ def test_it_is_known_how_much_of_the_motion_is_due_to_what() -> None:
 
 
 def verdict(*effects: str, confidence: float = 1.0, kind: str = "missing_effect") -> SimpleNamespace:
-    """What a diagnosis says, without its evidence."""
+    """A diagnosis without its evidence."""
     return SimpleNamespace(verdict=kind, effects=effects, confidence=confidence, rungs=())
 
 
@@ -184,7 +184,7 @@ def verdict(*effects: str, confidence: float = 1.0, kind: str = "missing_effect"
 def test_a_phantom_is_a_name_of_what_is_not_on_the_axis(
     truth: tuple[str, ...], said: tuple[str, ...], phantoms: tuple[str, ...], right: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By law, wherever it comes, beside the truth, too; it counts from a confidence of 0.9 on."""
+    """By law, at any place, also together with the truth; it counts from a confidence of 0.9 on."""
     monkeypatch.setattr(judge, "recorded", drawn)
     monkeypatch.setattr(judge, "diagnose", lambda *_, **__: verdict(*said))
     found = run(Case("test", truth, 1, "development", seconds=5.0))
@@ -209,7 +209,7 @@ def test_what_is_really_there_beside_the_truth_is_no_phantom(monkeypatch: pytest
 
 @pytest.mark.parametrize(("kinds", "phantoms"), [(("quadratic_drag", "mains_hum"), ()), (("mains_hum",), ("quadratic_drag",))])
 def test_an_effect_that_the_dirt_really_has_is_no_phantom(kinds: tuple[str, ...], phantoms: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor wrong, if it comes first: it is on the axis."""
+    """It is not wrong as the first name either, because it is on the axis."""
     case = Case("test", ("cogging",), 1, "development", seconds=5.0, dirt=0.03)
     seen = Seen(change={"cogging": 0.1}, noise=1e-4, dirt=0.03, kinds=kinds)
     monkeypatch.setattr(judge, "recorded", lambda *_: Recorded(2000.0, np.zeros(0), np.zeros(0), seen))
@@ -219,7 +219,7 @@ def test_an_effect_that_the_dirt_really_has_is_no_phantom(kinds: tuple[str, ...]
 
 
 def test_every_law_is_drawn_by_some_set() -> None:
-    """But for the base, which every axis has."""
+    """Except for the base, which every axis has."""
     own = {name for cases in sets("reporting").values() for case in cases for name in case.truth}
     others = {name for cases in foreign_sets("reporting").values() for case in cases for name in case.truth}
     assert {effect.name for effect in STANDARD.acting} <= own | others
@@ -228,14 +228,14 @@ def test_every_law_is_drawn_by_some_set() -> None:
 
 @pytest.mark.parametrize("name", ["load_side_resonance", "position_dependent_gain"])
 def test_a_law_that_came_later_is_named(name: str) -> None:
-    """With the parameters that the machine has."""
+    """With the parameters of the machine."""
     found = run(Case("further laws", (name,), 2, "development", seconds=SHORT))
     assert found.effects == (name,) and found.right and not found.phantoms, found
     assert found.errors and max(found.errors.values()) < 0.05
 
 
 def test_dirt_alone_may_be_called_not_in_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Or nothing; without dirt only nothing is right."""
+    """Or nothing missing; without dirt only nothing missing is right."""
     monkeypatch.setattr(judge, "diagnose", lambda *_, **__: verdict(kind="not_in_library"))
     case = Case("test", (), 1, "development", seconds=5.0)
     assert not run(case).right
@@ -243,7 +243,7 @@ def test_dirt_alone_may_be_called_not_in_the_library(monkeypatch: pytest.MonkeyP
 
 
 def test_the_page_tells_hits_misses_and_goals() -> None:
-    """One hit, one clean axis, one case that was called something else."""
+    """One hit, one clean axis, one wrong name."""
     hit, clean = judged("coulomb_friction"), judged()
     miss = replace(hit, case=replace(hit.case, truth=("dead_zone",)), right=False, first=False, wrong=True, phantoms=("coulomb_friction",))
     items = [replace(item, case=replace(item.case, group="standard"), confidence=1.0) for item in (hit, clean, miss)]
@@ -257,7 +257,7 @@ def test_the_page_tells_hits_misses_and_goals() -> None:
 
 
 def test_the_page_tells_whether_a_confidence_is_what_it_says() -> None:
-    """Verdicts by confidence, over all sets; what is right beside a phantom is not right."""
+    """Verdicts by confidence, over all sets; a right name together with a phantom is not right."""
     hit = judged("coulomb_friction")
     items = [replace(hit, confidence=0.95), replace(hit, confidence=0.95, phantoms=("backlash",)), replace(hit, confidence=0.6)]
     page = text({"imperfect 1 %": items, "10 s": [replace(hit, confidence=1.0)]}, "development", "python -m campaigns.blind", "")
@@ -281,7 +281,7 @@ def test_each_set_counts_as_right_what_its_goal_asks_for() -> None:
 
 
 def test_a_campaign_can_be_stopped_and_gone_on_with(tmp_path: Path) -> None:
-    """What was judged is read back the same; a line that a kill cut off is left out."""
+    """Results are read back unchanged; a line truncated by a kill is left out."""
     items = [judged("coulomb_friction"), judged()]
     for item in items:
         add(tmp_path / "kept", item)
@@ -292,7 +292,7 @@ def test_a_campaign_can_be_stopped_and_gone_on_with(tmp_path: Path) -> None:
 
 
 def test_remarks_outlive_the_next_campaign() -> None:
-    """What people wrote below the last heading stays."""
+    """The text by people below the last heading is kept."""
     old = "# Blind\n\nold\n\n## Remarks\n\nwritten\n"
     assert with_remarks("# Blind\n\nnew\n", old) == "# Blind\n\nnew\n\n## Remarks\n\nwritten\n"
     assert with_remarks("new\n", "old\n") == "new\n"

@@ -1,4 +1,4 @@
-"""The same tree as a colcon package: built in a copy, and a node run from what was installed."""
+"""The same tree as a colcon package: built in a copy, and a node run from the installation."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ needs_ros = pytest.mark.skipif(importlib.util.find_spec("rclpy") is None, reason
 
 
 def clean_environment() -> dict[str, str]:
-    """The environment without what another workspace may have left in it."""
+    """The environment without variables of another workspace."""
     left_out = ("AMENT_", "COLCON_", "PYTHONPATH", "ROS_DISTRO")
     return {key: value for key, value in os.environ.items() if not key.startswith(left_out)}
 
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """A workspace with a copy of what git would hand out, built."""
+    """A built workspace with a copy of the files in git."""
     space = tmp_path_factory.mktemp("ws")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False)
     if listed.returncode != 0:
@@ -58,7 +58,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 def in_workspace(workspace: Path, command: str) -> subprocess.Popen[str]:
-    """A command in a shell that has read the workspace's setup file, in a process group and a ROS domain of its own."""
+    """A command in a shell with the workspace's setup file, in a separate process group and ROS domain."""
     return subprocess.Popen(
         ["bash", "-c", f". install/local_setup.bash && exec {command}"],
         cwd=workspace,
@@ -94,7 +94,7 @@ def test_share_has_configuration_machines_and_launch_files(workspace: Path) -> N
 
 
 def test_the_installed_package_finds_its_files(workspace: Path) -> None:
-    """From the install space, configuration comes from share and not from the source tree."""
+    """In the install space, configuration comes from share, not from the source tree."""
     code = "from xy_sysid.files.package_files import find; print(find('demo'))"
     found = in_workspace(workspace, f'{sys.executable} -c "{code}"').communicate(timeout=60)[0].strip()
     assert Path(found).resolve() == (workspace / "install" / "xy_sysid" / "share" / "xy_sysid" / "config" / "demo.yaml").resolve()
@@ -102,7 +102,7 @@ def test_the_installed_package_finds_its_files(workspace: Path) -> None:
 
 @needs_ros
 def test_a_node_runs_from_the_install_space(workspace: Path) -> None:
-    """The excitation starts, says that it is unconfigured, and ends with code 0 on Ctrl-C."""
+    """The excitation starts, reports that it is unconfigured, and ends with code 0 on Ctrl-C."""
     node = in_workspace(workspace, "install/xy_sysid/lib/xy_sysid/excitation --ros-args -r __ns:=/t")
     assert node.stdout is not None
     too_late = threading.Timer(60.0, node.kill)

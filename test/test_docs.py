@@ -1,4 +1,4 @@
-"""Said once, checked everywhere: pages made from tables do not drift, commands named in words exist."""
+"""Said once, checked everywhere: generated pages are up to date, commands named in texts exist."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_the_settings_page_is_made_from_the_settings() -> None:
 
 
 def test_the_man_page_is_made_from_the_commands() -> None:
-    """python -m campaigns.documents.man --write; every command and each of its options is in it, and troff has nothing to warn of."""
+    """python -m campaigns.documents.man --write; it contains every command with all options, and troff gives no warning."""
     page = (ROOT / "docs" / "xy-sysid.1").read_text(encoding="utf-8")
     assert page == man_page()
     groff = shutil.which("groff")
@@ -44,7 +44,7 @@ def test_the_picture_of_the_packages_is_made_from_the_imports() -> None:
 
 
 def test_the_picture_leaves_out_what_a_longer_way_says_already() -> None:
-    """a -> b -> c: that a is imported by c too is not drawn."""
+    """a -> b -> c: a direct import of a by c is not drawn."""
     assert reduced({("b", "a"): 1, ("c", "b"): 1, ("c", "a"): 1}) == [("a", "b"), ("b", "c")]
 
 
@@ -63,7 +63,7 @@ def test_the_architecture_names_files_that_are_there() -> None:
 
 
 def test_the_page_of_commands_lists_every_command() -> None:
-    """No command is missing from the table, and none is made up."""
+    """The table lists exactly the existing commands."""
     names = {command.name for command in app.registered_commands}
     text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     first = re.findall(r"^\| (`.*?`) \|", text, re.MULTILINE)
@@ -71,14 +71,14 @@ def test_the_page_of_commands_lists_every_command() -> None:
 
 
 def anchors(page: Path) -> set[str]:
-    """The names of a page's headings in links, as GitHub and MkDocs make them."""
+    """The anchors of a page's headings, as by GitHub and MkDocs."""
     plain = (re.sub(r"[^\w\s-]", "", heading.lower()) for heading in re.findall(r"^#+ +(.*)$", page.read_text(encoding="utf-8"), re.MULTILINE))
     return {name for heading in plain for name in (re.sub(r"\s", "-", heading), re.sub(r"[-\s]+", "-", heading))}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_of_a_page_leads_somewhere(page: Path) -> None:
-    """Relative links point at files that are there, and at headings in them."""
+    """Relative links point to existing files and headings."""
     for target in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
         if "://" not in target:
             name, _, heading = target.partition("#")

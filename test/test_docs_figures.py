@@ -1,4 +1,4 @@
-"""Figures of the documentation that stand in two places are the same."""
+"""Numbers in two places of the documentation are equal."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ PAGE = ROOT / "docs" / "real-machines.md"
 
 
 def rows(name: str) -> list[list[str]]:
-    """The cells of a table that a benchmark writes, without its heading."""
+    """The cells of a benchmark's table, without its heading."""
     part = PAGE.read_text(encoding="utf-8").split(f"<!-- made by python -m campaigns.bench {name} -->")[1].split(f"<!-- end of {name} -->")[0]
     lines = [line for line in part.splitlines() if line.startswith("| ") and "---" not in line]
     return [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[1:]]

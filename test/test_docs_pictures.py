@@ -22,13 +22,13 @@ def test_the_page_is_made_by_its_command() -> None:
 
 
 def test_every_effect_of_the_library_has_its_example() -> None:
-    """An effect that a diagnosis can name and the simulated machine can have is shown; the first example is a machine without any."""
+    """Every effect that a diagnosis can name and the simulated machine can have is shown; the first example is a machine without any."""
     assert {example.effect for example in EXAMPLES} == {"", *(effect.name for effect in STANDARD.acting if effect.name in PARTS)}
     assert EXAMPLES[0].effect == "" and set(EFFECTS) >= {example.effect for example in EXAMPLES[1:]}
 
 
 def test_the_pictures_are_there_and_light() -> None:
-    """Each picture that the page shows exists, nothing else lies there, all of them weigh less than 3 MB."""
+    """The folder contains exactly the pictures of the page, in total less than 3 MB."""
     shown = {DOCS / target for target in re.findall(r"\]\((pictures/[^)]+)\)", page())}
     there = {path for path in (DOCS / "pictures").iterdir() if path.suffix == ".png"}
     assert {DOCS / picture(example) for example in EXAMPLES} <= shown <= there

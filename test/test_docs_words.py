@@ -1,4 +1,4 @@
-"""Words that must stay true: commands of the quick start run, quotations of the FAQ are said, names of topics and settings exist."""
+"""Texts that must stay true: commands of the quick start run, quotations of the FAQ exist, names of topics and settings exist."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def text(path: Path) -> str:
 
 
 def commands(page: str, heading: str) -> list[list[str]]:
-    """The indented xy-sysid lines below a heading, without their comments, as words."""
+    """The indented xy-sysid lines below a heading, without comments, as words."""
     part = page.split(heading)[1].split("\n## ")[0]
     return [line.split("#")[0].split()[1:] for line in part.splitlines() if line.startswith("    xy-sysid ")]
 
@@ -43,9 +43,9 @@ def test_the_first_five_minutes_run(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize("quote", re.findall(r"It says[^:]*: `([^`]+)`", text(DOCS / "faq.md")))
 def test_what_the_faq_quotes_is_said(quote: str) -> None:
-    """Each quotation stands in the source, word for word."""
+    """Each quotation is in the source, word for word."""
     sources = "\n".join(text(path) for path in (ROOT / "xy_sysid").rglob("*.py"))
-    joined = re.sub(r'"\s*\n\s*f?"', "", sources)  # a sentence may go over two lines
+    joined = re.sub(r'"\s*\n\s*f?"', "", sources)  # a sentence may span two lines
     assert quote in joined
 
 
@@ -64,7 +64,7 @@ def test_settings_that_the_words_name_exist(path: Path) -> None:
 
 
 def test_the_sign_test_of_the_safe_start_is_accepted_and_pushes_gently() -> None:
-    """The settings that the page tells to copy are valid, and drive one axis with that voltage and no noise."""
+    """The settings to copy from the page are valid, and drive one axis with that voltage and without noise."""
     lines = re.findall(r'^    ("[xy]": \{.*\})$', text(DOCS / "real-machine-safely.md"), re.MULTILINE)
     axes = {axis: build(AxisExcitation, values, axis) for line in lines for axis, values in yaml.safe_load(line).items()}
     assert list(axes) == ["x", "y"]
@@ -77,7 +77,7 @@ def test_the_sign_test_of_the_safe_start_is_accepted_and_pushes_gently() -> None
 
 
 def test_every_topic_of_the_nodes_is_in_the_table_of_topics() -> None:
-    """What a node publishes or hears under a fixed name stands in docs/topics.md."""
+    """The fixed topics of every node are in docs/topics.md."""
     page = text(DOCS / "topics.md")
     sources = "\n".join(text(path) for package in ("xy_sysid/nodes", "xy_sim") for path in (ROOT / package).rglob("*.py"))
     named = set(re.findall(r'(?:create_publisher|create_subscription|Ear)\((?:[\w.]+, )?\w+, f?"([^"]+)"', sources))
@@ -87,7 +87,7 @@ def test_every_topic_of_the_nodes_is_in_the_table_of_topics() -> None:
 
 
 def test_every_topic_of_the_recorder_is_in_the_table_of_topics() -> None:
-    """What the recorder keeps by default is explained."""
+    """The default topics of the recorder are explained."""
     page = text(DOCS / "topics.md")
     topics = next(item.value for item in knobs(NODES["recorder"]()) if item.name == "topics")
     for name in topics:

@@ -1,4 +1,4 @@
-"""The gallery's scripts run as they stand, in an empty folder."""
+"""The scripts of the gallery run unchanged, in an empty folder."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EXAMPLES = ROOT / "docs" / "examples"
 
 
 def run(name: str, folder: Path, *arguments: object) -> str:
-    """What it says, run as a script in this process; raises what it raises."""
+    """Output of a script run in this process; its errors are raised."""
     out, words = io.StringIO(), sys.argv
     sys.argv = [name, *map(str, arguments)]
     try:
@@ -36,7 +36,7 @@ def test_the_gallery_shows_every_example() -> None:
 
 
 def test_a_hidden_effect_is_named_and_the_error_falls_to_the_floor(tmp_path: Path) -> None:
-    """Cogging, as README says; a picture and a model are left behind."""
+    """Cogging, as in README; a figure and a model are written."""
     said = run("hidden_effect.py", tmp_path)
     assert "Missing: cogging" in said
     last = re.findall(r"([\d.]+) mm/s, floor ([\d.]+)", said)[-1]
@@ -45,14 +45,14 @@ def test_a_hidden_effect_is_named_and_the_error_falls_to_the_floor(tmp_path: Pat
 
 
 def test_a_csv_gives_a_transfer_function(tmp_path: Path) -> None:
-    """Millimetres are converted and told; every parameter has its interval."""
+    """Millimetres are converted with a note; every parameter has an interval."""
     said = run("own_csv.py", tmp_path)
     assert "is converted from mm to m" in said and re.search(r"resonance.*Hz", said)
     assert run("own_csv.py", tmp_path, "mine.csv") == said
 
 
 def test_an_effect_of_ones_own_is_fitted(tmp_path: Path) -> None:
-    """The file of docs/your-own-effect.md; its coefficient comes back."""
+    """The file of docs/your-own-effect.md; its coefficient is recovered."""
     page = (ROOT / "docs" / "your-own-effect.md").read_text(encoding="utf-8")
     (tmp_path / "mains_hum.py").write_text(page.split("```python\n")[1].split("```")[0], encoding="utf-8")
     said = run("own_effect.py", tmp_path)
@@ -61,7 +61,7 @@ def test_an_effect_of_ones_own_is_fitted(tmp_path: Path) -> None:
 
 
 def test_bags_of_two_days_are_compared(tmp_path: Path) -> None:
-    """The same machine still holds."""
+    """The model still holds for the same machine."""
     said = run("bag.py", tmp_path)
     assert said.count("the model holds") == 2
 

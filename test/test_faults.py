@@ -1,4 +1,4 @@
-"""The short fault campaign, and how what came of an attack is judged and told."""
+"""The short fault campaign, and the judgement and report of outcomes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_no_attack_finds_a_hole(group: str, attack: Attack, tmp_path: Path) -> N
 
 
 def test_every_row_of_the_page_holds() -> None:
-    """docs/faults.md is of a whole campaign: every attack of every group is there, and none is a hole."""
+    """docs/faults.md is from a full campaign: it has every attack of every group, and none found a fault."""
     page = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
     there = [(group, attack) for group, attack in ROWS if f"\n## {GROUPS[group]}\n" in page]
     assert there
@@ -42,7 +42,7 @@ def test_every_row_of_the_page_holds() -> None:
 
 
 def test_what_an_attack_finds_is_judged_by_how_it_ends(tmp_path: Path) -> None:
-    """One line of the project is good; two lines, another error, silence and an endless try are not."""
+    """One line with an error of the project is acceptable; two lines, another error, silence and an endless try are not."""
 
     def refused() -> Found:
         raise BadInput("a", 1, "2", "Change it.")
@@ -67,7 +67,7 @@ def test_what_an_attack_finds_is_judged_by_how_it_ends(tmp_path: Path) -> None:
 
 
 def test_an_attack_that_breaks_is_a_hole_of_its_own_and_ends_no_campaign(tmp_path: Path) -> None:
-    """What was found before stays, and the row says where it broke."""
+    """Earlier outcomes are kept, and the row names the failure."""
 
     def breaks(count: int, folder: Path) -> Iterator[Found]:
         yield Found("full")
@@ -79,7 +79,7 @@ def test_an_attack_that_breaks_is_a_hole_of_its_own_and_ends_no_campaign(tmp_pat
 
 
 def test_a_group_that_was_not_run_keeps_its_table() -> None:
-    """The others of the page stay as they were, in their order."""
+    """The other sections of the page are unchanged, in their order."""
     row = Row("jump", bound="60 ms")
     row.add(Found("zero volts", seconds=0.04, travel=0.002))
     page = text({"B": section("B", "words", [row])}, "# old\n\n## A\n\nkept\n\n## B\n\ngone\n", ["A", "B"], "")
@@ -87,7 +87,7 @@ def test_a_group_that_was_not_run_keeps_its_table() -> None:
 
 
 def test_a_hole_ends_the_campaign_with_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Exit code 1, and the row names how to do it again; none: 0."""
+    """Exit code 1, and the row says how to repeat it; without a fault: 0."""
     module = importlib.import_module("campaigns.faults.motion")
     for outcome, code in (("silent", 1), ("full", 0)):
         monkeypatch.setattr(module, "ATTACKS", (Attack("a", lambda *_, o=outcome: [Found(o, note="seed 9")], 1, 1),))

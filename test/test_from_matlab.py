@@ -1,4 +1,4 @@
-"""docs/from-matlab.md: every line on our side runs, in the order of the page."""
+"""docs/from-matlab.md: every line of our commands runs, in the order of the page."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ RATE = 500.0
 
 
 class Column:
-    """What a table's column offers to numpy, and nothing else."""
+    """A column that only has the numpy interface."""
 
     def __init__(self, values: list[float]) -> None:
         self._values = values
@@ -43,7 +43,7 @@ def moved(seconds: float, seed: int = 1) -> tuple[Any, Any]:
 
 
 def notebook(result: Any) -> Any:
-    """What a notebook shows of it."""
+    """Its representation in a notebook."""
     return result._repr_html_()
 
 
@@ -58,7 +58,7 @@ def model(run: xy.Run) -> xy.LinearModel:
 
 
 def test_importing_is_quick_quiet_and_needs_no_ros() -> None:
-    """Under 0.3 s, no word, and nothing heavy: numpy, numba, plotly, rclpy come when they are used."""
+    """Under 0.3 s, without output, and no heavy imports: numpy, numba, plotly, rclpy are imported at first use."""
     code = (
         "import sys, time; begun = time.process_time(); import xy_sysid; took = time.process_time() - begun\n"
         "assert took < 0.3, took\n"
@@ -70,24 +70,24 @@ def test_importing_is_quick_quiet_and_needs_no_ros() -> None:
 
 
 def test_every_public_name_is_there_and_has_a_docstring() -> None:
-    """``__all__`` is the list; what it names says what it is; nothing else is offered."""
+    """``__all__`` is complete; each item has a docstring; no other names are public."""
     for name in xy.__all__:
         assert getattr(xy, name) is not None, name
         if name != "__version__":
             assert (getattr(xy, name).__doc__ or "").strip(), name
     assert dir(xy) == sorted(xy.__all__)
     with pytest.raises(AttributeError, match="diagnose"):
-        _ = xy.diagnos  # type-checkers do not see through __getattr__, people misspell
+        _ = xy.diagnos  # type checkers do not follow __getattr__, and people misspell
 
 
 def test_the_public_names_are_those_of_the_reference() -> None:
-    """docs/api.md has one entry for each name, and none that is not public."""
+    """docs/api.md has exactly one entry for each public name."""
     told = re.findall(r"^::: xy_sysid\.(\w+)$", (ROOT / "docs" / "api.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert sorted(told) == sorted(name for name in xy.__all__ if name not in ("__version__", "plot"))
 
 
 def test_the_type_checker_sees_the_same_names() -> None:
-    """Every name is imported from its own package for type checkers, from where it is loaded when used."""
+    """For type checkers, every name is imported from the package from which it is loaded at first use."""
     text = (ROOT / "xy_sysid" / "__init__.py").read_text(encoding="utf-8")
     block = text.split("if TYPE_CHECKING:")[1].split("__all__")[0]
     for home, names in xy._HOMES.items():
@@ -96,7 +96,7 @@ def test_the_type_checker_sees_the_same_names() -> None:
 
 
 def test_arrays_become_a_recording_whatever_they_come_in() -> None:
-    """Lists, numpy, columns, columns by axis; lengths in mm become m; names as given."""
+    """Lists, numpy, columns, columns by axis; lengths in mm become m; names are kept."""
     u, y = [0.0, 1.0, 2.0, 1.0], [0.0, 1.0, 3.0, 2.0]
     plain = xy.Recording.from_arrays(RATE, u, y, units=("V", "mm"))
     assert plain.axes == ("x",) and plain.output_unit == "m"
@@ -125,7 +125,7 @@ def test_arrays_become_a_recording_whatever_they_come_in() -> None:
     ],
 )
 def test_arrays_that_are_no_recording_are_refused_in_one_line(values: tuple[Any, ...], words: str) -> None:
-    """Value, allowed range, next act."""
+    """Value, allowed range, next action."""
     with pytest.raises(xy.BadInput, match=words) as caught:
         xy.Recording.from_arrays(*values)
     assert "\n" not in str(caught.value) and caught.value.act
@@ -143,7 +143,7 @@ def test_results_are_frozen_and_say_what_they_are_in_one_line(run: xy.Run, model
 
 
 def test_a_response_is_fitted_and_the_model_is_the_machine(run: xy.Run, model: xy.LinearModel) -> None:
-    """Gain and pole of what moved the axis; every check passed; the model knows its axis and its data."""
+    """True gain and pole; every check passed; the model has its axis and the hash of its data."""
     assert model.tf.gain == pytest.approx(0.1, rel=0.01)
     assert max(abs(model.tf.poles())) == pytest.approx(60.0, rel=0.02)
     assert model.ok and model.axis == "x" and model.data == (run.digest,)
@@ -166,7 +166,7 @@ def test_an_unknown_setting_names_the_nearest(run: xy.Run) -> None:
 
 
 def test_a_model_is_saved_whole_and_replaces_nothing_unasked(model: xy.LinearModel, tmp_path: Path) -> None:
-    """The same back bit for bit; a second time only with force; nothing lies beside it."""
+    """The same data bit for bit; a second time only with force; no other files."""
     path = tmp_path / "model.yaml"
     xy.save(model, path)
     back = xy.load_model(path)
@@ -203,7 +203,7 @@ def test_models_go_to_control_and_scipy_with_the_same_response(model: xy.LinearM
 
 
 def test_a_model_is_made_smaller_with_its_error_said(model: xy.LinearModel) -> None:
-    """The rigid axis without its pole: an integrator, no further from the larger one than it says."""
+    """The rigid axis without its pole: an integrator, within the stated bound of the larger model."""
     small = xy.balanced_truncation(model, 1)
     frequency = np.array([0.5, 2.0, 10.0, 50.0])
     assert small.tf.denominator.size == 2 and small.tf.integrators == 1 and "1 pole," in repr(small)
@@ -211,7 +211,7 @@ def test_a_model_is_made_smaller_with_its_error_said(model: xy.LinearModel) -> N
 
 
 def test_what_is_missing_is_added_saved_and_better_on_data_neither_has_seen(tmp_path: Path) -> None:
-    """Dry friction: named, its steps fall to the floor, the file gives the model back, and the pair says better."""
+    """Dry friction: named, the error falls to the floor, the file restores the model, and the paired test says better."""
     first, second, third = (xy.simulate(20, effects=["x:coulomb_friction"], machine="rigid.yaml", seed=seed).run("x") for seed in (1, 2, 3))
     model = xy.fit(xy.frf(first))
     found = xy.diagnose([first, second])
@@ -236,7 +236,7 @@ def test_what_is_missing_is_added_saved_and_better_on_data_neither_has_seen(tmp_
 
 
 def test_a_diagnosis_speaks_in_the_units_of_the_data() -> None:
-    """Radians and amperes in the words as in the data; runs of different units are not taken for one axis."""
+    """Radians and amperes in texts and data; runs with different units are not combined."""
     u, y = moved(60.0)
     joint = xy.Recording.from_arrays(RATE, u, y, units=("A", "rad")).run("x")
     assert "mrad/s" in xy.diagnose(joint).sentence and "mm/s" not in xy.diagnose(joint).sentence
@@ -245,13 +245,13 @@ def test_a_diagnosis_speaks_in_the_units_of_the_data() -> None:
 
 
 def test_too_little_data_is_an_answer_and_no_error() -> None:
-    """Whoever asks gets told what lacks."""
+    """The error names the missing part."""
     still = xy.Recording.from_arrays(RATE, np.ones(2000), np.zeros(2000)).run("x")
     assert xy.diagnose(still).verdict == "not_enough_data"
 
 
 def test_without_matplotlib_a_picture_of_a_notebook_brings_plotly_along(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The figure is drawn by a copy of plotly.js in the output, and no other host is asked for one."""
+    """The figure is drawn by a copy of plotly.js in the output, without a request to another host."""
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     html = whole(go.Figure(go.Scatter(x=[1.0], y=[1.0])))
     assert "cdn.plot.ly" not in re.sub(r"<script[^>]*>.{100000,}?</script>", "", html, flags=re.DOTALL) and len(html) > 1_000_000

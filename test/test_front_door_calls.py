@@ -1,4 +1,4 @@
-"""The public functions as people call them: what is meant is done, what is wrong is one line with the right call, and results are tables."""
+"""The public functions as people call them: clear calls work, wrong ones give one line with the right call, and results are tables."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def called(name: str) -> Any:
 @given(name=st.sampled_from([name for name in [*FUNCTIONS, *PICTURES] if name not in ("simulate", "library")]), data=st.data())
 @settings(max_examples=200, deadline=None)
 def test_a_wrong_type_anywhere_is_one_line_that_says_the_right_call(name: str, data: Any) -> None:
-    """No traceback at any public function, whatever it is given: BadInput or another error of ours, in one line."""
+    """No public function gives a traceback, for any argument: BadInput or another error of ours, in one line."""
     parameters = inspect.signature(called(name)).parameters
     positional = sum(item.kind in (item.POSITIONAL_ONLY, item.POSITIONAL_OR_KEYWORD) for item in parameters.values())
     arguments = data.draw(st.lists(st.sampled_from(WRONG), max_size=positional + 1))
@@ -51,7 +51,7 @@ def test_a_wrong_type_anywhere_is_one_line_that_says_the_right_call(name: str, d
 
 
 def test_a_run_a_recording_or_a_file_is_fitted_as_its_frequency_response_is(run: xy.Run, model: xy.LinearModel, tmp_path: Path) -> None:
-    """What is meant is clear, so it is done, with the same numbers."""
+    """A clear intention is accepted, with the same numbers."""
     columns = np.column_stack((np.arange(run.voltage.size) / run.sampling_rate, run.voltage, run.position))
     np.savetxt(tmp_path / "rec.csv", columns, delimiter=",", header="time,x_voltage,x_position", comments="", fmt="%.17g")
     orders: dict[str, Any] = {"numerator_order": 0, "denominator_order": 2}
@@ -63,7 +63,7 @@ def test_a_run_a_recording_or_a_file_is_fitted_as_its_frequency_response_is(run:
     frequencies = xy.frf(run)
     lines = np.column_stack((frequencies.frequency, frequencies.response.real, frequencies.response.imag))[frequencies.trusted]
     np.savetxt(tmp_path / "frf.csv", lines, delimiter=",", header="frequency [Hz],real,imag", comments="")
-    half = 0.5 / run.sampling_rate  # of a file nothing says that the input was held: half a sample is delay
+    half = 0.5 / run.sampling_rate  # a file does not say that the input was held: half a sample is delay
     assert door.fit(str(tmp_path / "frf.csv"), **orders).tf.delay == pytest.approx(model.tf.delay + half, abs=2e-5)
     assert door.plot.bode(run, model).data
 
@@ -88,7 +88,7 @@ def test_a_model_and_a_run_may_come_in_either_order_and_from_files(run: xy.Run, 
     ],
 )
 def test_the_line_names_argument_value_what_is_allowed_and_the_call(call: Any, words: str) -> None:
-    """Whoever reads it knows what to type next."""
+    """The message contains the next call."""
     with pytest.raises(xy.BadInput) as told:
         call(xy)
     assert words in str(told.value)
@@ -103,7 +103,7 @@ def test_a_model_prints_its_formula_and_its_parameters(model: xy.LinearModel) ->
 
 
 def test_an_answer_prints_its_sentence_the_falling_error_and_the_parameters(run: xy.Run) -> None:
-    """What a notebook's ``print(found)`` is for; ``refine`` prints the same rows."""
+    """The output of ``print(found)`` in a notebook; ``refine`` prints the same rows."""
     found, refined = xy.diagnose(run), xy.refine(run, add=["coulomb_friction"], auto=False)
     assert str(found).startswith(found.sentence)
     names = [str(row[0]) for row in found.parameters]
@@ -113,7 +113,7 @@ def test_an_answer_prints_its_sentence_the_falling_error_and_the_parameters(run:
 
 
 def test_a_table_goes_to_pandas_markdown_and_latex() -> None:
-    """Numbers stay numbers in a frame; marks that mean something elsewhere are written so that they are seen."""
+    """Numbers are numbers in a frame; special characters of other formats are escaped."""
     table = Table(("name", "size (%)"), (("a_b|c", 12.5), ("d", None)))
     frame = table.to_frame()
     assert list(frame.columns) == ["name", "size (%)"] and frame["size (%)"].iloc[0] == 12.5

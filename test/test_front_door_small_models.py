@@ -1,4 +1,4 @@
-"""Short tests, servos, two axes at once and numbers in SI from Python: as the commands, with results that print themselves."""
+"""Short tests, servos, two axes at once and numbers in SI from Python: as the commands, with printable results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Machine code: made once on a machine, and no part of what a search may take."""
+"""Machine code: compiled once on a computer, and not counted in the budget of a search."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from xy_sysid.jit import spent_compiling
 
 
 def test_what_compiling_takes_is_told() -> None:
-    """A function that no disk has adds to it; calling it again adds nothing."""
+    """Compiling a function that is not cached adds to it; a second call adds nothing."""
     before = spent_compiling()
     twice = numba.njit(lambda x: x + x)
     assert twice(np.float64(2.0)) == 4.0
@@ -24,11 +24,11 @@ def test_what_compiling_takes_is_told() -> None:
 
 
 def test_a_budget_does_not_count_what_compiling_takes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clock that runs only while laws are compiled never ends a search: the first answer on a new machine is as whole as the second."""
+    """A clock that runs only during compilation never ends a search: the first answer on a new computer is as complete as the second."""
     clock = [0.0]
 
     def compiling() -> float:
-        clock[0] += 1.0  # each look finds another second gone
+        clock[0] += 1.0  # each reading advances by a second
         return clock[0]
 
     monkeypatch.setattr(search, "spent_compiling", compiling)

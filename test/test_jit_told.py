@@ -1,4 +1,4 @@
-"""A person is told when laws are compiled, which takes half a minute once on a machine."""
+"""The user is informed of the compilation of laws, which takes half a minute once on a computer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ print(*said)
 
 
 def test_compiling_is_told_as_a_whole_and_never_where_the_disk_has_it(tmp_path: Path) -> None:
-    """The first process compiles a function and another for it, and says once that it begins and ends; the second finds both on the disk."""
+    """The first process compiles a function and another for it, and reports start and end once; the second finds both on the disk."""
     text = "from xy_sysid.jit import compiled\n\n@compiled\ndef one(x):\n    return x + 1.0\n\n@compiled\ndef law(x):\n    return one(x)\n"
     (tmp_path / "law.py").write_text(text, encoding="utf-8")
     told = [subprocess.run([sys.executable, "-c", CODE], cwd=tmp_path, capture_output=True, text=True, check=True).stdout for _ in range(2)]
@@ -30,7 +30,7 @@ def test_compiling_is_told_as_a_whole_and_never_where_the_disk_has_it(tmp_path: 
 
 
 def test_a_bar_moves_while_laws_are_compiled_and_is_gone_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a terminal, also while another bar is shown; what is not a terminal gets no word."""
+    """On a terminal, also during another progress bar; no output without a terminal."""
     for terminal in (True, False):
         written = io.StringIO()
         monkeypatch.setattr(output, "aside", output.Terminal(file=written, force_terminal=terminal, width=100, legacy_windows=False))
@@ -41,4 +41,4 @@ def test_a_bar_moves_while_laws_are_compiled_and_is_gone_after_it(monkeypatch: p
             other.refresh()
             ends()
         assert (output.COMPILING in written.getvalue()) == terminal
-        assert not output.aside._live_stack  # nothing is left on the terminal
+        assert not output.aside._live_stack  # the terminal is clean afterwards

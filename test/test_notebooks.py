@@ -1,4 +1,4 @@
-"""The examples as notebooks: which cells a script has, and how their outputs are shown."""
+"""The examples as notebooks: cells of a script, and their outputs."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def twice(x):
 
 
 def test_a_paragraph_is_a_cell_and_a_picture_ends_its_own() -> None:
-    """Comments stay with their statement, a function with an empty line stays whole, and the picture is the last value of its cell."""
+    """Comments stay with their statement, a function with an empty line is one cell, and the figure is the last value of its cell."""
     said, code = cells(SCRIPT)
     assert said == "What it is about."
     assert code == ["import math", "# why\na = math.pi\nplot(a)", "save(a)", "def twice(x):\n\n    return 2 * x"]
 
 
 def test_outputs_are_shown_and_no_word_of_them_is_markup() -> None:
-    """Printed text is escaped; a picture is drawn by plotly.js from its numbers."""
+    """Printed text is escaped; plotly.js draws a figure from its numbers."""
     figure = {"data": [{"name": "</script>"}], "layout": {}}
     outputs: list[dict[str, object]] = [
         {"output_type": "stream", "text": "<1 Hz>"},
@@ -45,7 +45,7 @@ def test_outputs_are_shown_and_no_word_of_them_is_markup() -> None:
 
 
 def test_a_script_is_run_in_a_kernel_in_an_empty_folder(tmp_path: Path) -> None:
-    """The notebook has what its cells printed; the files that it needs are there; nothing is left here."""
+    """The notebook has the output of its cells; its files are provided; no files remain here."""
     pytest.importorskip("nbclient", reason="pip install '.[docs]'")
     pytest.importorskip("ipykernel")
     script = tmp_path / "small.py"

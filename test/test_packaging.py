@@ -1,4 +1,4 @@
-"""What the package says about itself, in every file that says it."""
+"""Metadata of the package, consistent in all files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from helpers.busy import busy
 
 @pytest.fixture(scope="module")
 def setup_arguments() -> dict[str, Any]:
-    """What setup.py hands to setuptools."""
+    """The arguments of setup.py for setuptools."""
     with mock.patch("setuptools.setup") as setup, pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
         runpy.run_path(str(ROOT / "setup.py"))
@@ -39,7 +39,7 @@ def text(manifest: ElementTree.Element, tag: str) -> str:
 
 
 def test_package_xml_and_setup_py_say_the_same(setup_arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
-    """Name, version, licence and maintainer are one; the mail address is valid, or colcon sees no ROS package."""
+    """Name, version, licence and maintainer are equal; the mail address must be valid, or colcon finds no ROS package."""
     assert text(manifest, "name") == setup_arguments["name"] == "xy_sysid"
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert text(manifest, "version") == setup_arguments["version"] == citation["version"]
@@ -52,9 +52,9 @@ def test_package_xml_and_setup_py_say_the_same(setup_arguments: dict[str, Any], 
 
 
 def test_ros_tools_accept_the_manifest_and_find_where_to_ask(setup_arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
-    """catkin_pkg, which colcon and rosdep use, reads it without a complaint; a website, a repository and a bugtracker are named as for pip.
+    """catkin_pkg, used by colcon and rosdep, reads it without a warning; website, repository and bugtracker are those for pip.
 
-    The domain of the maintainer's address is a real one: those reserved for examples (RFC 2606) reach nobody.
+    The domain of the maintainer's address is not one of those reserved for examples (RFC 2606).
     """
     package = pytest.importorskip("catkin_pkg.package", reason="catkin_pkg comes with the extra [test]")
     complaints: list[str] = []
@@ -68,7 +68,7 @@ def test_ros_tools_accept_the_manifest_and_find_where_to_ask(setup_arguments: di
 
 
 def test_every_dependency_has_a_rosdep_key_or_a_word_about_it(setup_arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
-    """What pip installs is in package.xml too, under its rosdep key; what has none is named in a comment."""
+    """All requirements of pip are in package.xml with their rosdep keys; those without a key are in a comment."""
     keys = {node.text for node in manifest.findall("exec_depend")}
     remarks = (ROOT / "package.xml").read_text(encoding="utf-8")
     for requirement in setup_arguments["install_requires"]:
@@ -95,7 +95,7 @@ def test_the_versions_of_everything_are_pinned(setup_arguments: dict[str, Any]) 
 
 
 def test_entry_points_lead_to_a_main_function(setup_arguments: dict[str, Any]) -> None:
-    """Every executable names a module of this tree that defines, or imports, main."""
+    """Every executable names a module of this tree with a main function."""
     scripts = dict(item.split(" = ") for item in setup_arguments["entry_points"]["console_scripts"])
     assert {"xy-sysid", "excitation", "identifier", "diagnoser", "recorder", "ballscrew"} == set(scripts)
     for name, target in scripts.items():
@@ -111,7 +111,7 @@ def test_entry_points_lead_to_a_main_function(setup_arguments: dict[str, Any]) -
 
 
 def test_share_holds_the_marker_the_manifest_the_configuration_and_the_launch_files(setup_arguments: dict[str, Any]) -> None:
-    """What ros2 launch, ros2 run and the nodes look for in an installation."""
+    """Files that ros2 launch, ros2 run and the nodes need in an installation."""
     data = {target: set(files) for target, files in setup_arguments["data_files"]}
     assert data["share/ament_index/resource_index/packages"] == {"resource/xy_sysid"}
     assert data["share/xy_sysid"] == {"package.xml"}
@@ -134,7 +134,7 @@ def test_hooks_and_the_check_script_use_what_make_installs() -> None:
 
 
 def test_the_check_script_tests_as_a_fresh_machine_would(tmp_path: Path) -> None:
-    """What changes Python's behaviour is gone before make test: unbuffered output has hidden a fault for long."""
+    """make test removes variables that change Python's behaviour: unbuffered output has hidden a fault before."""
     for name in ("make", "chromium"):
         (tmp_path / name).write_text("#!/bin/sh\necho $0 $@\nenv\n", encoding="utf-8")
         (tmp_path / name).chmod(0o755)
@@ -156,14 +156,14 @@ def test_the_pythons_that_are_promised_are_the_same_everywhere(setup_arguments: 
 
 
 def test_a_busy_machine_can_be_made_and_ends_with_the_test() -> None:
-    """make test-busy runs the tests beside processes that work, and leaves none behind."""
+    """make test-busy runs the tests together with busy processes, and ends these."""
     with busy(3) as numbers:
         assert len(numbers) == 3 and all(Path(f"/proc/{number}").exists() for number in numbers)
     assert not any(Path(f"/proc/{number}").exists() for number in numbers)
 
 
 def test_the_launch_file_starts_the_executables_and_moves_nothing_unasked(setup_arguments: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    """With stand-ins for launch: each node is an executable of the package, and activation depends on an argument that is off."""
+    """With stand-ins for launch: each node is an executable of the package, and activation is off by default."""
     made: list[tuple[str, dict[str, Any]]] = []
 
     class StandIn(types.ModuleType):
@@ -197,7 +197,7 @@ def test_the_launch_file_starts_the_executables_and_moves_nothing_unasked(setup_
 
 
 def test_the_package_and_not_its_clone_is_imported_beside_the_clone(tmp_path: Path) -> None:
-    """Whoever starts Python in the folder above a clone that is called xy_sysid gets the front door, not an empty namespace."""
+    """Python in the folder above a clone named xy_sysid imports the package, not an empty namespace."""
     (tmp_path / "xy_sysid").symlink_to(ROOT)
     words = "import xy_sysid; print(xy_sysid.__version__)"
     said = subprocess.run([sys.executable, "-c", words], cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""Phrases that a reader has to read twice do not come back: in README, the documentation, and all texts that the program shows."""
+"""Unclear phrases do not return: in README, the documentation, and all texts of the program."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from helpers import ROOT
 
-# phrase -> what to write instead; proselint, in ``make lint``, knows those of English in general
+# phrase -> replacement; proselint, in ``make lint``, checks general English
 INSTEAD = {
     r"(told|tells?|telling)\b[^.:,;]{0,40} apart\b": "distinguish",
     r"\btakes? away\b": "explains, removes",
@@ -47,7 +47,7 @@ def shown(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def texts() -> Iterator[tuple[str, str]]:
-    """(place, text) of everything that people read."""
+    """(place, text) of all texts for people."""
     for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("config/*.md")]:
         for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
             yield f"{page.name}:{number}", line
@@ -57,7 +57,7 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 def test_no_text_that_people_read_has_a_phrase_to_be_read_twice() -> None:
-    """Each phrase has a plain one that stands for it."""
+    """Each phrase has a plain replacement."""
     found = [
         f"{place}: {hit.group()!r}; write: {better}"
         for place, text in texts()

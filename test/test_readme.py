@@ -1,4 +1,4 @@
-"""Every code block of README runs, in its order, in one empty folder, and then what the quick start goes on with."""
+"""Every code block of README runs, in order, in one empty folder, followed by those of the quick start."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ import yaml
 from helpers import ROOT
 from helpers.cli_tools import Said, cli
 
-NOT_RUN = ("git clone", "axis x")  # the way to the program itself (test_packaging), an answer
-GOES_ON = "## The same in a notebook"  # from here on the quick start uses what README has made
+NOT_RUN = ("git clone", "axis x")  # the installation (test_packaging), an output
+GOES_ON = "## The same in a notebook"  # from here on the quick start uses the files of README
 
 
 def blocks(text: str) -> list[str]:
@@ -29,7 +29,7 @@ def blocks(text: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Walk:
-    """What a newcomer has after copying one block after the other: the folder, what each command said, and files that were overwritten."""
+    """The result of all blocks in sequence: the folder, the output of each command, and overwritten files."""
 
     folder: Path
     said: dict[str, Said]
@@ -38,7 +38,7 @@ class Walk:
 
 
 def installed(words: list[str], folder: Path) -> Said:
-    """The command as a process with nothing but a PATH to it, which finds what is installed."""
+    """The command as a process with only a PATH, which finds the installation."""
     bare = {name: os.environ[name] for name in ("HOME", "LANG", "TMPDIR") if name in os.environ}
     bare["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     done = subprocess.run(words, cwd=folder, env=bare, capture_output=True, text=True, check=False)
@@ -47,7 +47,7 @@ def installed(words: list[str], folder: Path) -> Said:
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Walk:
-    """compare in a process of its own; the other commands and the notebooks in this one."""
+    """compare in a separate process; the other commands and the notebooks in this one."""
     made = Walk(tmp_path_factory.mktemp("walk"), {}, 0, [])
     readme, quick = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/quick-start.md"))
     notebooks, shown = 0, plotly.io.renderers.default
@@ -74,14 +74,14 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Walk:
 
 
 def test_every_block_of_the_readme_runs_in_order_in_an_empty_folder(walk: Walk) -> None:
-    """A newcomer copies one after the other: each ends well, and none destroys what an earlier one made."""
+    """The commands in sequence: each succeeds, and none overwrites the file of an earlier one."""
     assert walk.overwritten == []
     assert set(walk.said) >= {"simulate", "compare", "diagnose", "refine", "fit", "validate"} and walk.notebooks == 2
     assert not any("Traceback" in said.err for said in walk.said.values())
 
 
 def test_four_commands_lead_from_a_hidden_effect_to_the_noise_floor(walk: Walk) -> None:
-    """The README's walk, as it stands there: each command answers, names are those that it prints, the error ends at the floor."""
+    """The commands of README, unchanged: each answers with the printed names, and the final error is at the floor."""
     part = (ROOT / "README.md").read_text(encoding="utf-8").split("## What is missing? Four commands")[1].split("\n## ")[0]
     assert re.findall(r"^    xy-sysid (\w+)", part, re.MULTILINE) == ["simulate", "compare", "diagnose", "refine"] == list(walk.said)[:4]
     for axis in ("x", "y"):
@@ -101,7 +101,7 @@ def test_four_commands_lead_from_a_hidden_effect_to_the_noise_floor(walk: Walk) 
 
 
 def test_what_is_saved_in_a_notebook_may_be_saved_again() -> None:
-    """Restart and run all: no cell of README, of the quick start or of an example refuses because of its own file from the run before."""
+    """Restart and run all: no cell of README, of the quick start or of an example fails because of its file from the previous run."""
     pages = [ROOT / "README.md", ROOT / "docs" / "quick-start.md", *(ROOT / "docs" / "examples").glob("*.py")]
     saved = [line.strip() for page in pages for line in page.read_text(encoding="utf-8").splitlines() if "xy.save(" in line]
     assert len(saved) >= 4 and [line for line in saved if "force=True" not in line] == []

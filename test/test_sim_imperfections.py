@@ -1,4 +1,4 @@
-"""Dirt: each kind does what it says, and machines without it are what they were."""
+"""Dirt: each kind follows its law, and machines without it are unchanged."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sim.parts import PARTS, cable_pull, chance, curve, uneven_lines
 from xy_sysid.samples.block import FloatArray
 
 GAIN, POLE, RATE = 0.097, 246.0, 2000.0  # of axis x of rigid.yaml: m/s/V, rad/s, Hz
-OLD_PARTS = [  # of axis x, before there was any dirt
+OLD_PARTS = [  # of axis x, before dirt was introduced
     ["hardening_stiffness"],
     ["dead_zone", "stribeck_friction", "hardening_stiffness"],
     ["saturation"],
@@ -38,7 +38,7 @@ def moved(machine: Machine, volts: FloatArray) -> FloatArray:
 
 
 def curve_of(machine: Machine, part: str) -> tuple[FloatArray, int]:
-    """The numbers of the axis, and where the part's curve begins in them."""
+    """The numbers of the axis, and the index of the part's curve in them."""
     own = machine.spec.axes[0]
     return numbers(own.drive, own.parts), slot(f"{part}.curve.0")
 
@@ -51,7 +51,7 @@ def crawl(machine: Machine, volts: float = 0.1, seconds: float = 2.0) -> tuple[F
 
 
 def test_a_curve_is_smooth_and_has_mean_zero_and_rms_one() -> None:
-    """Over one period; with its curvature continuous; another seed, another curve."""
+    """Periodic, with continuous curvature; another seed gives another curve."""
     heights, fine = curve.heights(7), np.arange(0.0, curve.KNOTS, 0.01)
     values = np.array([curve.value(heights, 0, x) for x in fine])
     assert values.mean() == pytest.approx(0.0, abs=1e-9) and values.std() == pytest.approx(1.0, rel=1e-3)
@@ -69,7 +69,7 @@ def test_chance_is_white_and_uniform() -> None:
 
 
 def test_speed_follows_the_uneven_drag() -> None:
-    """At a crawl the speed is gain times voltage over the drag's factor, within what the axis needs to follow (0.5 %)."""
+    """At slow speed it is gain times voltage over the drag's factor, within 0.5 % for the lag of the axis."""
     machine = axis(uneven_drag={"depth": 0.1})
     p, first = curve_of(machine, "uneven_drag")
     _, y, v = crawl(machine, 0.05, 4.0)
@@ -88,7 +88,7 @@ def test_speed_falls_where_the_motor_constant_is_high() -> None:
 
 
 def test_speed_follows_the_wandering_gain_and_friction() -> None:
-    """Gain times its factor; over the factor of the friction, of which a constant Coulomb level has its part."""
+    """Gain times its factor; minus the friction times its factor, including a constant Coulomb level."""
     machine = axis(gain_wander={"depth": 0.1, "time": 0.5})
     p, first = curve_of(machine, "gain_wander")
     t, _, v = crawl(machine, 1.0, 1.0)
@@ -101,7 +101,7 @@ def test_speed_follows_the_wandering_gain_and_friction() -> None:
 
 
 def test_wandering_friction_moves_the_breakaway_and_the_bristles() -> None:
-    """What holds 0.3 V on the mean lets 0.3 V go when the factor is below one; with bristles the sliding level follows, too."""
+    """A mean level of 0.3 V does not hold 0.3 V at a factor below one; with bristles the sliding level also follows."""
     seed = next(k for k in range(1, 50) if curve.value(curve.heights(k), 0, 0.0) < -0.5)
     wander = {"depth": 0.2, "time": 1e3, "seed": seed}
     volts = np.full(400, 0.295)
@@ -114,7 +114,7 @@ def test_wandering_friction_moves_the_breakaway_and_the_bristles() -> None:
 
 
 def test_a_cable_pulls_by_place_and_the_other_way_on_the_way_back() -> None:
-    """Twice its pull lies between forth and back at one place; the place's part is the curve."""
+    """Forth and back differ by twice its level at one position; the position-dependent part is the curve."""
     machine = axis(cable_pull={"pull": 0.05})
     p, first = curve_of(machine, "cable_pull")
     forth = cable_pull.force(p, first, 0.05, 1e-3, 5e-3, 0.01, 1e-3)
@@ -143,7 +143,7 @@ def test_jitter_adds_speed_times_a_random_instant() -> None:
 
 
 def test_uneven_lines_read_the_same_error_at_the_same_place() -> None:
-    """Reading less position is the law, whatever the way there; nothing at the origin; the motion itself is untouched."""
+    """Reading minus position is the law, independent of the path; zero at the origin; the motion is not affected."""
     volts = np.repeat([1.0, -1.0, 0.5], 1000)
     machine = axis(uneven_lines={})
     p, first = curve_of(machine, "uneven_lines")
@@ -155,7 +155,7 @@ def test_uneven_lines_read_the_same_error_at_the_same_place() -> None:
 
 
 def test_hum_is_at_the_mains_frequency_and_its_double() -> None:
-    """Without a command the axis hums at 50 and 100 Hz, with gain and pole of the drive, and at nothing else."""
+    """Without a command the axis vibrates only at 50 and 100 Hz, with gain and pole of the drive."""
     y = moved(axis(mains_hum={"ripple": 0.02, "rectified": 0.01}), np.zeros(6000))[2000:]
     size = 2.0 * np.abs(np.fft.rfft(np.hanning(4000) * (y - y.mean()))) / 2000.0
     for frequency, volts in ((50.0, 0.02), (100.0, 0.01)):
@@ -168,7 +168,7 @@ def test_hum_is_at_the_mains_frequency_and_its_double() -> None:
 @pytest.mark.parametrize("delay", [1.29e-3, 1.0e-3, 0.2e-3])
 @pytest.mark.parametrize("sample", [3, 4, 5, 6])
 def test_a_late_step_moves_as_one_with_another_delay(sample: int, delay: float) -> None:
-    """To rounding, be it early or late, over the edge of a sample or not."""
+    """To rounding, early or late, across the edge of a sample or not."""
     volts = np.zeros(40)
     volts[sample:] = 1.0
     steady = axis(time_delay=delay)
@@ -179,7 +179,7 @@ def test_a_late_step_moves_as_one_with_another_delay(sample: int, delay: float) 
 
 
 def test_first_order_steps_err_in_proportion_to_their_size() -> None:
-    """Half the step, half the error, in smooth motion and with stops; at 25 us it is below three per cent of the motion."""
+    """Half the step gives half the error, in smooth motion and with stops; at 25 us it is below 3 % of the motion."""
     volts = np.random.default_rng(2).standard_normal(4000)
     cases: list[dict[str, Any]] = [{}, {"coulomb_friction": 0.2}, {"presliding_hysteresis": {}}, {"screw_compliance": {}}]
     for parts in cases:
@@ -191,7 +191,7 @@ def test_first_order_steps_err_in_proportion_to_their_size() -> None:
 
 
 def test_first_order_steps_find_a_stop_at_the_end_of_a_step_only() -> None:
-    """An axis that friction brings to rest stops once, and stays."""
+    """An axis that friction stops stays at rest."""
     volts = np.repeat([1.0, 0.0], 200)
     y = moved(axis(coulomb_friction=0.2, first_order_steps={}), volts)
     exact = moved(axis(coulomb_friction=0.2), volts)
@@ -209,7 +209,7 @@ def test_halving_the_inner_step_changes_no_dirt(name: str) -> None:
 
 
 def test_dirt_is_never_drawn_and_old_seeds_give_their_old_machines() -> None:
-    """As before there was any dirt: parts, sizes and motion."""
+    """As before dirt was introduced: parts, sizes and motion."""
     for seed in range(40):
         assert not {name for own in draw(seed, (1, 3)).spec.axes for name in own.parts} & set(DIRT)
     assert [list(draw(seed, (1, 3)).spec.axes[0].parts)[1:] for seed in range(5)] == OLD_PARTS

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """make docs: strict, so that a dead link is an error."""
+    """make docs: strict, so that a broken link is an error."""
     made = tmp_path_factory.mktemp("docs") / "site"
     pytest.importorskip("material", reason="pip install '.[docs]'")
     pytest.importorskip("mkdocstrings")
@@ -33,7 +33,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_site_shows_the_examples_and_the_docstrings(site: Path) -> None:
-    """Examples in full; the reference has meaning, not only names."""
+    """Full examples; the reference has descriptions, not only names."""
     assert "Four commands" in (site / "index.html").read_text(encoding="utf-8")
     gallery = re.sub(r"<[^>]+>", "", (site / "gallery.html").read_text(encoding="utf-8"))
     assert "xy.simulate(60, hidden=12)" in gallery
@@ -45,7 +45,7 @@ def test_the_site_shows_the_examples_and_the_docstrings(site: Path) -> None:
 
 @needs_browser
 def test_the_site_is_searched_from_a_folder_without_a_network(site: Path) -> None:
-    """Opened as a file: the search box answers, the picture of the packages is there, and no other host is asked."""
+    """Opened as a file: the search works, the picture of the packages is shown, and there is no request to another host."""
     asked: list[str] = []
     with browser() as chromium:
         page = chromium.new_page()

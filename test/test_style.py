@@ -1,4 +1,4 @@
-"""The shape of the source: who may import whom, what the core must not touch, and what must not be in a file."""
+"""Rules of the source: allowed imports, limits of the core, and forbidden content of files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def names(text: str) -> list[str]:
     return text.split()
 
 
-# Upstream first, in the order of the data: a file imports from its own package and from what stands before it.
+# Upstream first, in the order of the data: a file imports from its own package and from earlier ones.
 CORE = names("""
 errors units settings jit tables
 samples excitation
@@ -33,7 +33,7 @@ bags imports files processes fleets
 nodes report page cli front_door
 """)
 ORDER = [*CORE, *EDGE]
-ALONE = {"__init__", "__main__", "errors", "settings", "units", "jit", "tables"}  # files that stand beside the packages
+ALONE = {"__init__", "__main__", "errors", "settings", "units", "jit", "tables"}  # files next to the packages
 
 NOT_IN_CORE = names("""
 rclpy std_msgs sensor_msgs diagnostic_msgs rosbags typer rich plotly yaml
@@ -60,7 +60,7 @@ def tree_of(path: Path) -> ast.Module:
 
 @functools.cache
 def imported(path: Path) -> set[str]:
-    """Full names of all that a file imports, wherever in the file it does, save for type checking only."""
+    """Full names of all imports of a file, at any place, except for type checking."""
     found: set[str] = set()
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
@@ -80,7 +80,7 @@ def place_of(module: str) -> str:
 
 
 def test_a_file_imports_only_from_upstream() -> None:
-    """Reading order = data order = import order. Only the two doors, ``__init__`` and ``__main__``, open on everything."""
+    """Reading order = data order = import order. Only ``__init__`` and ``__main__`` may import everything."""
     wrong = []
     for path in sources("xy_sysid"):
         place = place_of(module_of(path))
@@ -96,7 +96,7 @@ def test_a_file_imports_only_from_upstream() -> None:
 
 
 def test_only_what_everybody_knows_stands_beside_the_packages() -> None:
-    """Everything else is in a package; a package is a folder with a docstring that says what is in it."""
+    """Everything else is in a package; a package is a folder with a docstring about its content."""
     assert {path.stem for path in (ROOT / "xy_sysid").glob("*.py")} == ALONE
     packages = {path.parent.name: ast.get_docstring(tree_of(path)) for path in (ROOT / "xy_sysid").glob("*/__init__.py")}
     assert sorted([*packages, *ALONE]) == sorted({*ORDER, *ALONE})
@@ -105,7 +105,7 @@ def test_only_what_everybody_knows_stands_beside_the_packages() -> None:
 
 
 def test_the_core_knows_no_ros_no_files_no_clock_and_does_not_print() -> None:
-    """The core is told; it never asks: data, time and randomness are arguments."""
+    """Data, time and randomness are arguments of the core, which never reads them itself."""
     wrong: dict[str, set[str]] = {}
     for path in [path for path in sources("xy_sysid") if place_of(module_of(path)) in CORE]:
         calls = {node.func.id for node in ast.walk(tree_of(path)) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
@@ -115,7 +115,7 @@ def test_the_core_knows_no_ros_no_files_no_clock_and_does_not_print() -> None:
 
 
 def test_the_simulated_machine_shares_no_physics_with_the_identification() -> None:
-    """Never mark your own homework: apart from its nodes, xy_sim takes only tools from xy_sysid."""
+    """Independent truth: except for its nodes, xy_sim imports only tools from xy_sysid."""
     for path in sources("xy_sim"):
         taken = {name for name in imported(path) if name.split(".")[0] == "xy_sysid"}
         assert path.name in ("node.py", "ballscrew_node.py", "controller_node.py", "trajectory_node.py") or taken <= SHARED_WITH_THE_MACHINE, path
@@ -132,7 +132,7 @@ def test_no_import_goes_in_a_circle() -> None:
 
 
 def _classes(path: Path) -> list[str]:
-    """Public names of a file that say what something is: classes, and types with a name."""
+    """Public classes and named types of a file."""
     found = [node.name for node in tree_of(path).body if isinstance(node, ast.ClassDef)]
     for node in tree_of(path).body:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
@@ -141,13 +141,13 @@ def _classes(path: Path) -> list[str]:
 
 
 def test_slow_parts_of_scipy_are_loaded_when_they_are_first_used() -> None:
-    """``import scipy`` is enough: scipy.signal and scipy.stats take a second, which most commands and nodes need not wait for."""
+    """``import scipy`` is enough: scipy.signal and scipy.stats take a second, and most commands and nodes do not need them."""
     slow = re.compile(r"^(import|from) scipy\.(signal|stats|optimize)\b|^from scipy import", re.MULTILINE)
     assert [str(path) for path in sources("xy_sysid") if slow.search(path.read_text(encoding="utf-8"))] == []
 
 
 def test_no_public_class_name_stands_for_two_things_in_the_core() -> None:
-    """One name, one thing: who reads ``Quantity`` need not ask whose."""
+    """One name, one meaning: a public name is unique in the package."""
     where: dict[str, list[str]] = {}
     for path in sources("xy_sysid"):
         if place_of(module_of(path)) in CORE:
@@ -158,7 +158,7 @@ def test_no_public_class_name_stands_for_two_things_in_the_core() -> None:
 
 
 def _fields(path: Path) -> dict[str, int]:
-    """How many fields each dataclass of a file has."""
+    """Number of fields of each dataclass of a file."""
     found = {}
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.ClassDef) and any("dataclass" in ast.unparse(item) for item in node.decorator_list):
@@ -167,7 +167,7 @@ def _fields(path: Path) -> dict[str, int]:
 
 
 def test_what_has_more_than_four_fields_is_built_by_keyword() -> None:
-    """Four values may stand in their order; of more, each says what it is. Effects write tables of their parameters."""
+    """Up to four values may be positional; more must be named. Effects may have tables of their parameters."""
     large = {name for path in sources("xy_sysid") for name, fields in _fields(path).items() if fields > 4} - {"Parameter"}
     wrong = []
     for path, node in [(file, node) for file in sources("xy_sysid") for node in ast.walk(tree_of(file))]:
@@ -183,7 +183,7 @@ def _parameters(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 
 def test_a_function_has_at_most_six_parameters() -> None:
-    """Kernels take numbers one by one; a command's parameters are its options, and so are the keywords of a public function."""
+    """Exceptions: kernels with separate numbers, options of a command, and keywords of a public function."""
     wrong = []
     for path in [path for path in [*sources("xy_sysid"), *sources("xy_sim")] if not module_of(path).startswith("xy_sysid.cli.")]:
         for node in ast.walk(tree_of(path)):
@@ -198,7 +198,7 @@ def _kernel(decorator: ast.expr) -> bool:
 
 
 def test_tests_share_helpers_and_never_each_other() -> None:
-    """A test can be read, moved and run alone; what several need is in test/helpers."""
+    """A test can be read, moved and run alone; shared code is in test/helpers."""
     for path in sources("test"):
         taken = {name.split(".")[0] for name in imported(path)}
         assert not [name for name in taken if name.startswith("test_")], path
@@ -208,7 +208,7 @@ EVERYWHERE = ("xy_sysid", "xy_sim", "campaigns", "test")
 
 
 def test_nothing_silences_the_type_checker() -> None:
-    """A wrong type is mended, not hushed."""
+    """A wrong type is fixed, not suppressed."""
     for path in [path for place in EVERYWHERE for path in sources(place)]:
         assert "type: " + "ignore" not in path.read_text(encoding="utf-8"), path
 
@@ -228,7 +228,7 @@ def _raises(handler: ast.ExceptHandler) -> bool:
 
 
 def test_no_file_names_a_host_to_install_from_or_a_path_of_one_machine() -> None:
-    """A clone works anywhere: packages come from wherever pip is set up to look."""
+    """A clone works anywhere: packages come from pip's configured index."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False)
     if listed.returncode != 0:
         pytest.skip("not a git clone")

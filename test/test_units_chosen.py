@@ -1,4 +1,4 @@
-"""Units that a reader chooses: for lengths and angles, their speeds and what stands over them, and only where they were chosen."""
+"""Chosen units of a reader: for lengths and angles, their speeds and units with them in a denominator, and only within the choice."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from xy_sysid.units import chosen_units, motion, moved, readable, shown_in
     ],
 )
 def test_a_motion_is_shown_in_the_chosen_unit(choice: str, unit: str, factor: float, shown: str) -> None:
-    """Other quantities, counts of an encoder and unknown choices stay as they are."""
+    """Other quantities, encoder counts and unknown choices are unchanged."""
     with shown_in([choice]):
         scale, name = motion(unit)
         assert scale == pytest.approx(factor) and name == shown
@@ -34,7 +34,7 @@ def test_a_motion_is_shown_in_the_chosen_unit(choice: str, unit: str, factor: fl
 
 
 def test_a_choice_holds_in_its_task_and_no_longer() -> None:
-    """A second browser, which another task serves, keeps its own; after the block the usual units are back."""
+    """A second browser, in another task, keeps its own units; after the block the default units are restored."""
     heard = []
     with shown_in(["um", "deg"]):
         other = threading.Thread(target=lambda: heard.append(chosen_units()))

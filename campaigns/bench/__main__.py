@@ -1,11 +1,11 @@
 """python -m campaigns.bench [--short] [name ...]: run the benchmarks and write docs/benchmarks.md.
 
-h1, frf, fit, replay, bags, live and intervals run without a name. Only by name:
+Without a name: h1, frf, fit, replay, bags, live and intervals. Only by name:
     long_bag (a day of data, gigabytes on disk), axis_model, settle, settle_limits, settle_precision,
     use (a path after a minute of identification: half an hour), fleet (a year of 20 machines), trend
-    real_fits, peers, diagnoses, emps_force, next_part: of the recordings of real machines in $XY_SYSID_DATA
+    real_fits, peers, diagnoses, emps_force, next_part: with the recordings of real machines in $XY_SYSID_DATA
 peers and diagnoses write their tables to docs/real-machines.md, use and emps_force to docs/use.md.
---short: a little of each, as the tests run it; nothing is written.
+--short: a small part of each, as in the tests; nothing is written.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ def text(name: str, table: Table) -> str:
 
 
 def main() -> int:
-    """Run what was asked for; the page is written when everything ran."""
-    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy comes in: one core for everybody
+    """Run the requested benchmarks; the page is written after all have run."""
+    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy is imported: one core for all software
         os.environ.setdefault(threads, "1")
     asked = [word for word in sys.argv[1:] if word != "--short"]
     short = len(asked) < len(sys.argv) - 1

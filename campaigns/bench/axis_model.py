@@ -1,4 +1,4 @@
-"""Time of the generated loop against one written by hand for the same model, of compiling, loading and fitting.
+"""Time of the generated loop compared with a handwritten one for the same model; time of compiling, loading and fitting.
 
 python -m campaigns.bench axis_model
 """
@@ -37,7 +37,7 @@ print(loaded - start, time.perf_counter() - loaded)
 
 @compiled
 def by_hand(u: FloatArray, gain: float, delay: float, pole: float, coulomb: float, fs: float, out: FloatArray) -> None:
-    """Base and Coulomb friction, one fused loop with nothing else in it; the same mathematics."""
+    """Base and Coulomb friction in one loop without anything else; the same mathematics."""
     whole = int(delay * fs)
     part = delay * fs - whole
     v = 0.0
@@ -87,7 +87,7 @@ def best(action: Callable[[], object], times: int) -> float:
 
 
 def fresh(folder: str) -> tuple[float, float]:
-    """Import and first simulation of a new process, s, with numba's cache in this folder."""
+    """Time of the import, and of the first simulation, in a new process, s, with numba's cache in this folder."""
     ran = subprocess.run(
         [sys.executable, "-c", FIRST_CALL], env={**os.environ, "NUMBA_CACHE_DIR": folder}, capture_output=True, text=True, check=True
     )
@@ -96,7 +96,7 @@ def fresh(folder: str) -> tuple[float, float]:
 
 
 def main(short: bool = False) -> None:
-    """Print what was measured."""
+    """Print the results."""
     seconds, times = (BRIEF, 1) if short else (SECONDS, 15)
     n = int(RATE * seconds) + 1
     u = np.asarray(sosfilt(butter(4, 300, fs=RATE, output="sos"), np.random.default_rng(0).standard_normal(n)))

@@ -1,4 +1,4 @@
-"""How fast bags are read, against deserializing message by message, measured in one run.
+"""Speed of reading bags, compared with deserializing message by message in the same run.
 
 The reference is the plain loop with rosbags: read, deserialize, take the numbers. Of the time to stream
 blocks, a third is the kernel's copying of the file out of its cache. Our recorder writes sqlite3 files in pages of 32 KB,
@@ -30,7 +30,7 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 def write_blocks(path: Path, samples: int) -> int:
-    """Two axes at 2 kHz, 20 rows a message, voltage and position; the number of samples read from it."""
+    """Write two axes at 2 kHz, 20 rows per message, voltage and position; returns the number of samples in the bag."""
     values = np.random.default_rng(0).normal(size=(2, ROWS, 2))
     with BagWriter(path, "mcap" if "mcap" in path.name else "sqlite3") as writer:
         for first in range(0, samples, ROWS):
@@ -41,7 +41,7 @@ def write_blocks(path: Path, samples: int) -> int:
 
 
 def write_usual(path: Path, samples: int) -> int:
-    """The same in sqlite's usual pages."""
+    """The same with sqlite's default page size."""
     count = write_blocks(path, samples)
     with contextlib.closing(sqlite3.connect(next(path.glob("*.db3")), isolation_level=None)) as database:
         database.execute("PRAGMA page_size=4096")
@@ -50,7 +50,7 @@ def write_usual(path: Path, samples: int) -> int:
 
 
 def write_joints(path: Path, samples: int) -> int:
-    """Two joints at 2 kHz, one sample a message."""
+    """Write two joints at 2 kHz, one sample per message; returns the number of samples."""
     types = STORE.types
     stamp, (position, velocity, effort) = types["builtin_interfaces/msg/Time"], np.random.default_rng(0).normal(size=(3, ROWS, 2))
     with BagWriter(path, "mcap" if "mcap" in path.name else "sqlite3") as writer:
@@ -64,7 +64,7 @@ def write_joints(path: Path, samples: int) -> int:
 
 
 def loop(path: Path) -> None:
-    """The yardstick: each message deserialized by rosbags, its numbers taken."""
+    """The reference: rosbags deserializes each message, and its numbers are read."""
     with Reader(path) as reader:
         for connection, _, raw in reader.messages():
             message = STORE.deserialize_cdr(raw, connection.msgtype)
@@ -72,7 +72,7 @@ def loop(path: Path) -> None:
 
 
 def stream(path: Path) -> None:
-    """Every sample as blocks, in log order."""
+    """Read every sample as blocks, in log order."""
     for _ in stream_blocks(path):
         pass
 
@@ -88,7 +88,7 @@ def best(work: Callable[[Path], object], path: Path, repeats: int) -> float:
 
 
 def run(report: Callable[[str], None], short: bool = False) -> Table:
-    """Million samples a second, and ratios to the loop that deserializes message by message."""
+    """Million samples per second, and ratios to the loop that deserializes message by message."""
     samples = int((BRIEF if short else MINUTES) * 60 * RATE) // ROWS * ROWS
     few = 1 if short else REPEATS
     found: dict[str, tuple[float, float, float]] = {}

@@ -1,7 +1,7 @@
-"""python -m campaigns.bench diagnoses: what ``xy-sysid diagnose`` says about every recording of a real machine, each by a command of its own.
+"""python -m campaigns.bench diagnoses: results of ``xy-sysid diagnose`` for every recording of a real machine, each with its own command.
 
-The table is written to docs/real-machines.md. Errors are those of the rigid model and of the final one, in the windows that no fit saw.
-Seconds are of the processor, for the whole command with its imports and reading.
+The table is written to docs/real-machines.md. Errors are those of the rigid model and of the final one, in held-out windows.
+Seconds are processor time of the full command, with imports and reading.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ COLUMNS = ("recording", "verdict", "effects", "confidence", "explained", "held-o
 
 
 def asked(row: Shared) -> tuple[dict[str, Any] | None, str, float]:
-    """The answer of the command or None, its one line where it refuses, and its processor time, s."""
+    """The answer of the command (None on failure), its error message, and its processor time, s."""
     before = os.times()
     words = [sys.executable, "-m", "xy_sysid", "diagnose", str(DATA / row.path), *row.options, "--json"]
     said = subprocess.run(words, capture_output=True, text=True, check=False)
@@ -40,7 +40,7 @@ def line(title: str, found: dict[str, Any], seconds: str) -> tuple[str, ...]:
 
 
 def main(short: bool = False) -> None:
-    """Print the table as Markdown, and put it into the page."""
+    """Print the table as Markdown, and write it to the page."""
     lines, refused, why = [], [], []
     for row in rows(short):
         answer, words, seconds = asked(row)

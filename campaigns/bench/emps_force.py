@@ -1,8 +1,8 @@
 """python -m campaigns.bench emps_force: the input of the second half of EMPS, predicted from its motion by a model of the first half.
 
 EMPS is a motor, a ball screw and a mass under position control, measured by Janot, Gautier and Brunot (2019); 1 V is 35.15 N. The table is written to
-docs/use.md. Both inputs are compared below a frequency; above, the recorded one is what the controller makes of encoder counts. The last column adds
-the force by position that the model leaves in the first half (``control_design.measured_table``).
+docs/use.md. Both inputs are compared below a frequency; above, the recorded one is the controller's response to quantisation. The last column adds
+the position-dependent force that the model does not explain in the first half (``control_design.measured_table``).
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from xy_sysid.imports import load
 
 BELOW = (10.0, 20.0, 50.0, 100.0)  # Hz
 COLUMNS = ("compared below", "kV and kA", "with kS", "whole feedforward", "and the table of the first half")
-SHORT_EFFECTS = ("coulomb_friction", "asymmetric_viscous_friction")  # what the search finds
+SHORT_EFFECTS = ("coulomb_friction", "asymmetric_viscous_friction")  # result of the search
 
 
 def parts(short: bool) -> list[tuple[str, ...]]:
-    """Rows: what each prediction leaves of the recorded input's rms, in per cent."""
+    """Rows: residual of each prediction, in per cent of the recorded input's rms."""
     run = load(Path(os.environ.get("XY_SYSID_DATA") or DATA) / "emps" / "emps_train.npz").run("x")
     first, second = run.until(0.5 * run.seconds), run.after(len(run) // 2)
     model = refine(first, SHORT_EFFECTS, auto=False).model if short else refine(first).model
@@ -53,7 +53,7 @@ def parts(short: bool) -> list[tuple[str, ...]]:
 
 
 def main(short: bool = False) -> None:
-    """Print the table as Markdown, and put it into the page unless it is short."""
+    """Print the table as Markdown; if not short, write it to the page."""
     made = markdown(COLUMNS, parts(short))
     sys.stdout.write(made + "\n")
     if not short:

@@ -1,4 +1,4 @@
-"""Transfer function with delay on 612 lines, against scipy.optimize.least_squares and vector fitting.
+"""Transfer function with delay on 612 lines, compared with scipy.optimize.least_squares and vector fitting.
 
 The response is one of a minute of simulated data of the paper's machine (H1, Hann windows of 4096, 0.5 to 300 Hz). Every fit
 minimises the same cost: errors over sigma, the window's blur and the hold in the model. ``least_squares`` differentiates
@@ -31,18 +31,18 @@ LINES, REPEATS = 612, 15
 
 
 def measured() -> FrequencyResponse:
-    """612 lines."""
+    """A simulated response with 612 lines."""
     return response(*recorded(machine(), 60.0, 1e-6, 7)).select(slice(0, LINES))
 
 
 def start_from(tf: TransferFunction) -> TransferFunction:
-    """The same, every parameter but the pair's frequencies 10 per cent off."""
+    """The model with every parameter changed by 10 %, except the frequencies of the pair."""
     denominator = np.convolve(np.convolve([1.0, 0.0], [1.0, 1.1 * 246.0]), [1.0, 2 * 0.044 * 2 * np.pi * 47.3, (2 * np.pi * 47.3) ** 2])
     return replace(tf, numerator=tf.numerator * np.array([1.1, 1.2, 1.1]), denominator=denominator, delay=0.9 * tf.delay)
 
 
 class ByHand:
-    """Weighted errors as a function of scaled coefficients and the delay, written down with the public functions."""
+    """Weighted errors as a function of scaled coefficients and the delay, with the public functions."""
 
     def __init__(self, frf: FrequencyResponse, start: TransferFunction) -> None:
         grid = frf.frequency[:, None] + frf.kernel_offset[None, :]
@@ -56,7 +56,7 @@ class ByHand:
         self.scale = np.concatenate((start.numerator, start.denominator[1:-1], [start.delay]))
 
     def model(self, x: FloatArray) -> TransferFunction:
-        """From parameters scaled to 1 at the start."""
+        """The model for parameters that are scaled to 1 at the start."""
         values = x * self.scale
         return replace(self._start, numerator=values[:3], denominator=np.concatenate(([1.0], values[3:6], [0.0])), delay=max(float(values[6]), 0.0))
 
@@ -68,7 +68,7 @@ class ByHand:
 
 
 def in_kernel(frf: FrequencyResponse, start: TransferFunction) -> tuple[Callable[[FloatArray], FloatArray], FloatArray]:
-    """(weighted errors, start): our own compiled model in its orthonormal basis, for whoever has it at hand."""
+    """(weighted errors, start) of our compiled model in its orthonormal basis."""
     task = problem(frf, Structure())
     point = from_transfer_function(task, start)
     assert point is not None
@@ -83,7 +83,7 @@ def in_kernel(frf: FrequencyResponse, start: TransferFunction) -> tuple[Callable
 
 
 def vector_fit(frf: FrequencyResponse, pairs: int) -> ComplexArray:
-    """The response that scikit-rf's vector fitting finds for s H(s), with so many complex pairs and one real pole."""
+    """The response by scikit-rf's vector fitting of s H(s), with ``pairs`` complex pairs and one real pole."""
     import skrf
     from skrf.vectorFitting import VectorFitting
 

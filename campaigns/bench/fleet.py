@@ -1,7 +1,7 @@
-"""python -m campaigns.bench fleet: a year of 20 machines, 200 recordings of 20 s; three go bad. Does the fleet's trend find the three, and no other?
+"""python -m campaigns.bench fleet: a year of 20 machines, 200 recordings of 20 s; three develop faults. Does the trend find these three only?
 
-Also: recordings an hour and core, one and two processes side by side, reading against computing, and the memory of a process over the run.
-With a folder in $XY_SYSID_FLEET the recordings and the table stay there, and what is done is not done again.
+Also: recordings per hour and core, one and two processes, time of reading and computing, and the memory of a process over the run.
+With a folder in $XY_SYSID_FLEET the recordings and the table are kept there and reused.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from xy_sysid.report.trend_page import overview_figure
 if TYPE_CHECKING:
     from distributed import Client
 
-SOME = 24  # recordings that one and two processes do side by side
+SOME = 24  # recordings in the comparison of one and two processes
 FEW = Workshop(machines=2, recordings=2, seconds=4.0, faults={})
 DRAWN = ("coulomb_friction_coulomb", "base_resonance_frequency", "gain")
 PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "fleet.png"
-DAY = 100_000  # recordings, on paper
+DAY = 100_000  # recordings per day, for an extrapolation
 
 
 def main(short: bool = False) -> None:
-    """Print what was found, and the figures."""
+    """Print the result and the figures."""
     shop = FEW if short else Workshop()
     kept = os.environ.get("XY_SYSID_FLEET", "")
     with tempfile.TemporaryDirectory() as other:
@@ -67,18 +67,18 @@ def main(short: bool = False) -> None:
 
 
 def resident() -> float:
-    """MB that a process holds."""
+    """Resident memory of this process, MB."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def speed(paths: list[Path], folder: Path) -> list[tuple[str, str]]:
-    """One and two processes with the same recordings, each after it has done one: by the clock, and by the processor time of all processes.
+    """One and two processes with the same recordings, after one recording each to warm up: elapsed time, and processor time of all processes.
 
-    Processor time is what counts on a computer that others use, too: there the clock measures the others.
+    On a shared computer only processor time is meaningful: elapsed time depends on other users.
     """
     rates, costs = {}, {}
-    chosen = [path for begin in (0, len(paths) // 2) for path in paths[begin : begin + SOME // 2]]  # on rock, and on feet
+    chosen = [path for begin in (0, len(paths) // 2) for path in paths[begin : begin + SOME // 2]]  # half on rigid foundations, half on feet
     for workers in (1, 2):
         with connected(Cluster(workers=workers)) as client, tempfile.TemporaryDirectory(dir=folder) as place:
             run(paths[:workers], Path(place) / "first", Analysis(), client)
@@ -93,12 +93,12 @@ def speed(paths: list[Path], folder: Path) -> list[tuple[str, str]]:
 
 
 def spent(client: Client) -> float:
-    """s of processor time of a cluster's processes so far, with this one, in which the scheduler runs."""
+    """Processor time of a cluster's processes so far, s, including this one, in which the scheduler runs."""
     return time.process_time() + float(sum(client.run(time.process_time).values()))
 
 
 def costs(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
-    """Processor time of a recording by its parts, and what a large fleet needs."""
+    """Processor time of a recording by parts, and the need of a large fleet."""
     parts = {name: float(np.mean([row[f"seconds_{name}"] or 0.0 for row in rows])) for name in ("reading", "fit", "diagnosis")}
     each = sum(parts.values())
     lines = [(f"processor time for {name}, mean", f"{1e3 * seconds:.0f} ms") for name, seconds in parts.items()]
@@ -107,13 +107,13 @@ def costs(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
 
 
 def picture(found: Trends) -> None:
-    """docs/pictures/fleet.png: the parameters that the three machines change, of all machines."""
+    """Draw docs/pictures/fleet.png: the parameters that change on the three machines, for all machines."""
     figures = [overview_figure([one for one in found.trends if one.history.column == column], column) for column in DRAWN]
     shoot(figures, PICTURE, 380, 300)
 
 
 def verdict(found: Trends) -> str:
-    """What the trend says, and whether it is right: the machines that go bad, no other, and each for its own reason."""
+    """The result of the trend, and whether it is correct: only the faulty machines, each with its cause."""
     axes = {(one.machine, one.axis): one for one in found.axes}
     said = "\n".join(f"- {sentence(event, axes[event.machine, event.axis])}" for event in found.events)
     named: dict[str, set[str]] = {}

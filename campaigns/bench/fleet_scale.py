@@ -1,9 +1,9 @@
 """python -m campaigns.bench fleet_scale: 1,000 short recordings through the fleet's engine, and 80 of 60 s.
 
-The 1,000 show what the engine costs a task, and whether a process keeps memory: one process does all of them, and its resident memory is looked at
-after every 50. The 80 of 60 s, 20 of each of four machines, are a run of the whole command on two processes: how far are 1,000 such recordings from
+The 1,000 show the overhead of the engine per task, and whether a process leaks memory: one process does all of them, and its resident memory is read
+after every 50. The 80 of 60 s, 20 of each of four machines, are a run of the full command on two processes: how far are 1,000 such recordings from
 10 minutes on two cores? All times are processor time of all processes, which other users of the computer disturb less than the clock.
-With a folder in $XY_SYSID_FLEET_LONG the recordings of 60 s stay there and are not simulated again.
+With a folder in $XY_SYSID_FLEET_LONG the recordings of 60 s are kept there and reused.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from xy_sysid.fleets.of_paths import Analysis, run
 from xy_sysid.fleets.table import read
 from xy_sysid.imports import save
 
-COUNT, SHORT, DIFFERENT = 1_000, 0.15, 20  # recordings, s of each, and how many differ
-LONG = Workshop(machines=4, recordings=20, seconds=60.0, faults={})  # half on rock, half on feet; 1,000 would be of 50 machines
-EVERY = 50  # recordings between two looks at the memory
-WARM = 100  # recordings after which a process has loaded and compiled all that it needs
+COUNT, SHORT, DIFFERENT = 1_000, 0.15, 20  # recordings, s of each, and number of different ones
+LONG = Workshop(machines=4, recordings=20, seconds=60.0, faults={})  # half on rigid foundations, half on feet; 1,000 would be of 50 machines
+EVERY = 50  # recordings between two readings of the memory
+WARM = 100  # recordings after which a process has loaded and compiled all its code
 GOAL = 1.2  # s of processor time: 1,000 recordings in 10 minutes on two cores
 PARTS = ("reading", "fit", "diagnosis")
 Line = tuple[str, str]
@@ -46,7 +46,7 @@ def main(short: bool = False) -> None:
 
 
 def many(folder: Path, count: int, different: int) -> list[Line]:
-    """What a task costs besides its own work, and the memory of the process."""
+    """Overhead of a task, and memory of the process."""
     shop = Workshop(machines=different, recordings=1, seconds=SHORT, faults={})
     for number in range(different):
         first = folder / "recordings" / f"mill-{number:02d}" / f"{BEGIN:%Y-%m-%d}.npz"
@@ -81,11 +81,11 @@ def many(folder: Path, count: int, different: int) -> list[Line]:
 
 
 def long_ones(folder: Path, shop: Workshop = LONG) -> list[Line]:
-    """Processor time of a run of recordings of 60 s, engine included, and its parts: of the first recordings of the machines, and of the others."""
+    """Processor time of a run of recordings of 60 s with the engine, and its parts: first recordings of the machines, and the others."""
     place = Path(os.environ.get("XY_SYSID_FLEET_LONG", "") or folder / "long")
     paths = list(shop.made(place))
     with connected(Cluster(workers=2)) as client:
-        run(paths[:: shop.recordings], folder / "warm", Analysis(), client)  # what a process loads once
+        run(paths[:: shop.recordings], folder / "warm", Analysis(), client)  # warm-up
         before, begun = spent(client), time.perf_counter()
         run(paths, folder / "long table", Analysis(), client)
         total, clock = spent(client) - before, time.perf_counter() - begun
@@ -104,7 +104,7 @@ def long_ones(folder: Path, shop: Workshop = LONG) -> list[Line]:
 
 
 def told_minutes(seconds: float) -> str:
-    """The minutes of all recordings, from the s of each."""
+    """Minutes for all recordings, from the s of each."""
     return f"{COUNT * seconds / 60.0:.1f} min"
 
 

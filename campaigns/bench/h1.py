@@ -1,4 +1,4 @@
-"""H1 and coherence of five minutes, against scipy.signal, pyFRF and the bare FFTs.
+"""H1 and coherence of five minutes, compared with scipy.signal, pyFRF and the bare FFTs.
 
 600,000 samples of one axis at 2 kHz, Hann windows of 4096, half overlapped, the window's mean removed. Ours gives the response,
 the coherence and sigma, and takes both signals through one complex FFT a window; scipy.signal runs ``csd`` and two ``welch``;
@@ -27,7 +27,7 @@ SAMPLES, BRIEF, REPEATS = 600_000, 20_000, 21
 
 
 def ours(u: FloatArray, y: FloatArray) -> FrequencyResponse:
-    """The plain variant, which is the paper's."""
+    """H1 without differencing, as in the paper."""
     return frequency_response(batch_spectra([(0, u, y)], SHAPE, False), SHAPE, RATE, H1Options(differenced=False))
 
 

@@ -1,4 +1,4 @@
-"""How often the 95 % intervals hold the truth: many simulated recordings of a machine that is known exactly.
+"""Coverage of the 95 % intervals: many simulated recordings of an exactly known machine.
 
     python -m campaigns.bench intervals
 
@@ -31,7 +31,7 @@ RATE = 2000.0
 SHAPE = WindowShape.of("hann", 4096, 0.5)
 LEAST, MOST = 93.0, 97.0  # per cent
 RUNS, FEW = 400, 3
-CASES = ((60.0, 1e-6), (60.0, 10e-6))  # (s, m rms of noise): where leakage scatters more than noise, and where it does not
+CASES = ((60.0, 1e-6), (60.0, 10e-6))  # (s, m rms of noise): leakage larger than noise, and smaller
 
 
 def machine() -> TransferFunction:
@@ -59,7 +59,7 @@ def response(u: FloatArray, y: FloatArray) -> FrequencyResponse:
 
 
 def truths(tf: TransferFunction, fit: Fit) -> dict[str, float]:
-    """The true value of everything that a fit gives an interval of."""
+    """The true value of each parameter with an interval."""
     exact: dict[str, float] = {"delay": tf.delay, "gain": tf.gain}
     for name, value in zip(fit.parameters, np.concatenate((tf.numerator, tf.denominator[1:-1])), strict=False):
         exact[name] = float(value)
@@ -76,7 +76,7 @@ def truths(tf: TransferFunction, fit: Fit) -> dict[str, float]:
 
 
 def trials(runs: int, seconds: float, noise: float, report: Callable[[str], None] = lambda _: None) -> tuple[dict[str, list[Interval]], list[Fit]]:
-    """Estimates by name over so many recordings, and the fits."""
+    """Estimates by name over ``runs`` recordings, and the fits."""
     tf = machine()
     found: dict[str, list[Interval]] = {}
     fits: list[Fit] = []

@@ -1,4 +1,4 @@
-"""The nodes over real DDS: how much of a core each needs in real time, and how fast they go without losing a sample.
+"""The nodes over real DDS: processor load of each in real time, and the highest speed without lost samples.
 
 Machine, excitation and identifier as processes of their own on this machine, two axes at 2 kHz in blocks of 20, fits every
 2 s; processor time from /proc once the windows are full, so that the fits are in it. For the highest speed the excitation
@@ -28,7 +28,7 @@ RATE, WATCHED, FAST = 2000.0, 20.0, 300.0  # Hz; s of real time; s of data as fa
 
 @contextmanager
 def nodes(excitation: dict[str, str]) -> Iterator[tuple[Monitor, dict[str, subprocess.Popen[bytes]]]]:
-    """A monitor and the processes, in a domain of their own; ended at the end."""
+    """A monitor and the processes, in a separate domain; all are ended at exit."""
     domain = str(os.getpid() % 90 + 10)
     os.environ.update(ROS_DOMAIN_ID=domain, ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
     from xy_sysid.cli.monitor import Monitor
@@ -56,7 +56,7 @@ def nodes(excitation: dict[str, str]) -> Iterator[tuple[Monitor, dict[str, subpr
 
 
 def until(monitor: Monitor, done: Callable[[], bool], seconds: float, what: str) -> None:
-    """Listen until it is done; SystemExit if it is not done in time."""
+    """Receive messages until ``done``; SystemExit after ``seconds``."""
     end = time.monotonic() + seconds
     while not done():
         if time.monotonic() > end:
@@ -66,7 +66,7 @@ def until(monitor: Monitor, done: Callable[[], bool], seconds: float, what: str)
 
 
 def value(monitor: Monitor, status: str, key: str) -> float:
-    """A number that a node says of itself; 0 until it does."""
+    """A number from the status of a node; 0 before the first status."""
     return float(monitor.statuses.get(status, (0, "", {}))[2].get(key, "0"))
 
 
@@ -77,7 +77,7 @@ def processor(process: subprocess.Popen[bytes]) -> float:
 
 
 def real_time(watched: float, windows: int) -> dict[str, float]:
-    """Per cent of a core of each node over so many seconds, after the first windows."""
+    """Load of each node in per cent of a core, over ``watched`` seconds after the first windows."""
     with nodes({"speed": "1.0", "lockstep": "false", "watchdog": "2.0"}) as (monitor, started):
         until(monitor, lambda: value(monitor, "axis x", "windows") >= windows, 180.0, "the first windows")
         before, begun = {name: processor(process) for name, process in started.items()}, time.monotonic()
@@ -88,7 +88,7 @@ def real_time(watched: float, windows: int) -> dict[str, float]:
 
 
 def as_fast_as_it_goes(fast: float) -> tuple[float, int, int, dict[str, str]]:
-    """(times real time, samples sent, samples paired, what the identifier complains of)."""
+    """(times real time, samples sent, samples paired, faults that the identifier reports)."""
     with nodes({"speed": "0.0", "lockstep": "true", "duration": str(fast)}) as (monitor, _):
         until(monitor, lambda: value(monitor, "streams", "samples paired") > 0, 180.0, "the first sample")
         first, begun = value(monitor, "streams", "samples paired"), time.monotonic()

@@ -1,8 +1,8 @@
-"""A recording of hours is streamed in linear time and flat memory.
+"""A recording of hours is streamed in linear time and with constant memory.
 
     python -m campaigns.bench.long_bag [--hours 0.0417 1 4] [--storage sqlite3] [--rows 20] [--json]
 
-Two axes at 2 kHz. A bag is written in bulk, streamed by a process of its own, whose peak memory is taken, and deleted.
+Two axes at 2 kHz. A bag is written in bulk, streamed by a separate process, whose peak memory is measured, and deleted.
 24 hours (--hours 24) need 16 GB of disk.
 """
 
@@ -24,7 +24,7 @@ from xy_sysid.bags.cdr import ARRAY_TYPE, encode_array
 from xy_sysid.samples.block import Block, columns, pack
 
 RATE = 2000
-ALLOWED = 400.0  # MB
+ALLOWED = 400.0  # MB, highest peak memory
 BRIEF = ("--hours", "0.002", "0.004")
 
 READ = """
@@ -42,7 +42,7 @@ print(json.dumps({"seconds": time.perf_counter() - begin, "samples": counts, "ri
 
 
 def write(path: Path, storage: str, samples: int, rows: int) -> None:
-    """Voltage and position in blocks; only counter and time change from block to block, so that writing is quick."""
+    """Write voltage and position in blocks; only counter and time change from block to block, so that writing is fast."""
     values = np.random.default_rng(0).normal(size=(rows, 2))
     label = ("sample", columns(("x", "y")))
     message = encode_array(label, (rows, 4), pack(Block(("x", "y"), np.arange(float(rows)), np.arange(float(rows)) / RATE, values)))
@@ -57,7 +57,7 @@ def write(path: Path, storage: str, samples: int, rows: int) -> None:
 
 
 def measure(folder: Path, storage: str, hours: float, rows: int) -> dict[str, float]:
-    """Write, stream, delete."""
+    """Write, stream and delete a bag; returns sizes, times and peak memory."""
     samples = int(hours * 3600 * RATE) // rows * rows
     path, small = folder / "long", folder / "small"
     begin = time.perf_counter()
@@ -75,7 +75,7 @@ def measure(folder: Path, storage: str, hours: float, rows: int) -> dict[str, fl
 
 
 def main(short: bool = False) -> None:
-    """Print what was measured; SystemExit for more memory than allowed."""
+    """Print the results; SystemExit for more memory than allowed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--hours", type=float, nargs="+", default=[1 / 24, 1.0, 4.0])
     parser.add_argument("--storage", choices=("sqlite3", "mcap"), default="sqlite3")

@@ -14,8 +14,8 @@ import numpy as np
 
 from xy_sysid.samples.block import FloatArray
 
-STEPS = 8  # of MuJoCo in a sample
-LATE = 2  # samples until a voltage acts
+STEPS = 8  # steps of MuJoCo per sample
+LATE = 2  # delay of the voltage, samples
 XML = """
 <mujoco>
   <option timestep="{step}" integrator="implicitfast" gravity="{gravity} 0 0" iterations="100" tolerance="1e-12"/>
@@ -37,11 +37,11 @@ class MujocoMachine:
     axes = ("x",)
 
     def __init__(self, kind: str, parts: Mapping[str, Mapping[str, float]], noise: float, seed: int) -> None:
-        """kind: hinge or slide; noise: of the encoder, rad or m; seed: of that noise."""
+        """kind: hinge or slide; noise: of the encoder, rad or m rms; seed: of that noise."""
         self._mujoco: Any = importlib.import_module("mujoco")
         self.rate, self.noise, self.seed = 1000.0, noise, seed
         gain, pole, mass = (3.0, 40.0, 1e-3) if kind == "hinge" else (0.1, 60.0, 1e-4)
-        inertia = 1.0 / (gain * pole)  # V s^2 a unit of length: volts are torque here
+        inertia = 1.0 / (gain * pole)  # V s^2 per unit of length: torque is in volts here
         size = {name: next(iter(values.values())) for name, values in parts.items()}
         pull = size.get("gravity", 0.0) / (mass * 0.1) if kind == "hinge" else -size.get("constant_load", 0.0) / mass
         text = XML.format(
@@ -68,7 +68,7 @@ class MujocoMachine:
 
     @property
     def place(self) -> float:
-        """Where the joint truly is, rad or m."""
+        """True position of the joint, rad or m."""
         return float(self._data.qpos[0])
 
     def step(self, voltage: FloatArray) -> FloatArray:

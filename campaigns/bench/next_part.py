@@ -1,8 +1,8 @@
-"""python -m campaigns.bench next_part: does the interval of a parameter hold for the next recording of the same machine?
+"""python -m campaigns.bench next_part: coverage of a parameter's interval for the next recording of the same machine.
 
-The recordings of real machines in $XY_SYSID_DATA are cut into parts of equal length, each of which is diagnosed as a recording of its own. From the
-first four parts on, the trend says where each parameter of the next part lies with 95 %; counted is how often it does, and how often it lies within
-the interval of the part before alone. A part without an answer, or with another answer than the part before, does not count: its model is another.
+The recordings of real machines in $XY_SYSID_DATA are cut into parts of equal length, and each part is diagnosed as a separate recording. From the
+fourth part on, the trend gives a 95 % interval for each parameter of the next part. The table counts how often the parameter is within it, and within
+the interval of the previous part alone. A part without an answer, or with other effects than the previous part, does not count.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from xy_sysid.fleets.trends import of_rows
 from xy_sysid.imports import load
 
 PARTS = 8
-SHORT = "gap_foreign/gap_linear_37um.npz"  # of which a quarter is enough
+SHORT = "gap_foreign/gap_linear_37um.npz"  # a quarter of it is used
 COLUMNS = ("recording", "parts", "parameters of a next part", "within the interval with the spread", "within that of the part before alone")
 
 
 def parts(row: Shared, count: int, seconds: float = math.inf) -> list[Row]:
-    """The rows of so many parts of a recording, or of its first seconds. Raises BadInput and BadRecording where it cannot be read."""
+    """The rows of ``count`` parts of a recording, or of its first seconds. Raises BadInput and BadRecording if it cannot be read."""
     (path,), reading = asked(row)
     read = load(path, reading)
     seconds = min(len(read) / read.sampling_rate, seconds)
@@ -38,7 +38,7 @@ def parts(row: Shared, count: int, seconds: float = math.inf) -> list[Row]:
 
 
 def foretold(found: Sequence[Row]) -> Iterator[tuple[str, bool, bool]]:
-    """Parameter by parameter of each part: its column, whether it lies within the interval with the spread, and within that of the part before."""
+    """For each parameter of each part: column, whether it is within the interval with the spread, and within that of the previous part."""
     for count in range(FEWEST, len(found)):
         now, before = found[count], found[count - 1]
         if any(row.get("verdict") in (None, "not_enough_data") for row in (now, before)) or now.get("model") != before.get("model"):

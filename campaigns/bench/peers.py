@@ -1,9 +1,9 @@
-"""python -m campaigns.bench peers [PART ...]: our fits against plain least squares, on recordings of real machines; writes docs/real-machines.md.
+"""python -m campaigns.bench peers [PART ...]: our fits compared with least squares, on recordings of real machines; writes docs/real-machines.md.
 
 Models: a rigid axis (gain, delay, pole), and the same with Coulomb friction. Peers of the same structure, with numpy and scipy alone:
-inverse dynamics (lstsq of the input on acceleration, velocity, perhaps a load, and the direction; Gautier & Khalil 1990), and output error
-(``scipy.optimize.least_squares`` on the velocity in the windows that our fit sees, from three starts). Both simulate with our simulator, and
-are judged in the windows that no fit saw. PART: only recordings whose path holds this word; then nothing is written.
+inverse dynamics (lstsq of the input on acceleration, velocity, optionally a load, and the direction; Gautier & Khalil 1990), and output error
+(``scipy.optimize.least_squares`` on the velocity in the windows of our fit, from three starts). Both use our simulator, and
+are judged in held-out windows. PART: only recordings whose path contains this word; then nothing is written.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from xy_sysid.units import moved
 
 COULOMB = "coulomb_friction"
 CUTOFF = 25.0  # Hz, of the low-pass of inverse dynamics
-POLES = (1e-3, 1e6)  # rad/s, between which output error looks
-REST = 0.05  # of the highest speed; inverse dynamics uses faster samples only
+POLES = (1e-3, 1e6)  # rad/s, bounds of the pole in output error
+REST = 0.05  # fraction of the highest speed; inverse dynamics uses faster samples only
 SUB_STEPS = 4000.0  # Hz, of the simulation within a fit by output error
-GOAL = 1.15  # times the peer's held-out error
+GOAL = 1.15  # largest ratio to the peer's held-out error
 COLUMNS = ("recording", "structure", "ours", "peer", "which", "ratio", "objective, ours / peer", "seconds, ours / peer")
 
 
@@ -46,7 +46,7 @@ class Judged:
 
 
 def simulated(data: AxisData, model: AxisModel, fine: float = FINE) -> FloatArray:
-    """(n - r,) velocity of each recording from its own first speed."""
+    """(n - r,) simulated velocity of all recordings, each from its own start speed."""
     parts = []
     for run in data.runs:
         u, x = data.voltage[run], data.position[run]
@@ -56,7 +56,7 @@ def simulated(data: AxisData, model: AxisModel, fine: float = FINE) -> FloatArra
 
 
 def judged(data: AxisData, model: AxisModel) -> Judged:
-    """What a model leaves."""
+    """Held-out error and score of a model."""
     error = data.velocity - simulated(data, model)
 
     def power(windows: Windows) -> FloatArray:
@@ -67,13 +67,13 @@ def judged(data: AxisData, model: AxisModel) -> Judged:
 
 
 def made(gain: float, delay: float, pole: float, coulomb: float | None) -> AxisModel:
-    """An axis, with Coulomb friction unless that is None."""
+    """An axis model, with Coulomb friction unless it is None."""
     rigid = AxisModel(gain, delay, pole, library=STANDARD)
     return rigid if coulomb is None else rigid.with_effect(COULOMB, (coulomb,))
 
 
 def inverse_dynamics(data: AxisData, friction: bool, load: bool) -> tuple[float, float, float] | None:
-    """(gain, pole, Coulomb friction) by linear least squares in the samples that move; None where inertia or drag is negative."""
+    """(gain, pole, Coulomb friction) by linear least squares in the samples in motion; None if inertia or drag is negative."""
     sides = scipy.signal.butter(2, min(CUTOFF, 0.2 * data.sampling_rate), fs=data.sampling_rate)
     columns = []
     for run, step in zip(data.runs, data.steps, strict=True):
@@ -89,7 +89,7 @@ def inverse_dynamics(data: AxisData, friction: bool, load: bool) -> tuple[float,
 
 
 def guess(data: AxisData, pole: float) -> tuple[float, float, float]:
-    """(gain, pole, Coulomb friction) of an axis of this pole: the gain explains the velocity best, friction is a tenth of the input."""
+    """(gain, pole, Coulomb friction) for a pole: the gain that explains the velocity best, and friction of a tenth of the input."""
     unit = simulated(data, made(1.0, 0.0, pole, None), SUB_STEPS)
     return float(unit @ data.velocity) / float(unit @ unit), pole, 0.1 * float(np.std(data.voltage))
 
@@ -120,7 +120,7 @@ def output_error(data: AxisData, start: tuple[float, float, float], friction: bo
 
 
 def peers(data: AxisData, friction: bool) -> dict[str, Judged]:
-    """What each peer reaches: the best of inverse dynamics with and without a load, and the likeliest of output error from three starts."""
+    """The result of each peer: the best of inverse dynamics with and without a load, and of output error from three starts."""
     read = [inverse_dynamics(data, friction, load) for load in (False, True)]
     inverse = [judged(data, made(one[0], 0.0, min(max(one[1], 1e-2), 1e5), one[2] if friction else None)) for one in read if one is not None]
     other = read if friction else [*read, inverse_dynamics(data, True, True)]
@@ -132,7 +132,7 @@ def peers(data: AxisData, friction: bool) -> dict[str, Judged]:
 
 
 def ours(data: AxisData) -> dict[str, tuple[GreyboxFit, float]]:
-    """Our fit of each structure, and its processor time, s; that with friction begins from the rigid one."""
+    """Our fit of each structure, and its processor time, s; the one with friction starts from the rigid one."""
     begun = time.process_time()
     base = fit_base(data)
     rigid = time.process_time() - begun
@@ -158,8 +158,8 @@ def compared(title: str, data: AxisData) -> list[tuple[str, ...]]:
 
 
 def main(short: bool = False) -> None:
-    """Print the table as Markdown, and put it into the page."""
-    warnings.simplefilter("ignore")  # of trial models that run away
+    """Print the table as Markdown, and write it to the page."""
+    warnings.simplefilter("ignore")  # of diverging trial models
     words, lines, refused = sys.argv[1:], [], []
     for row in rows(short):
         if words and not any(word in row.path for word in words):

@@ -1,7 +1,7 @@
 """python -m campaigns.bench real_fits FOLDER: relative error of every estimator on the two-inertia bench (multisineA, multisineB).
 
 FOLDER holds ``two_inertia_bench`` (HoriFujimotoLab/FdiTools, MIT). The band is that of the multisine, 10 to 255 Hz; orders are
-those that ``fit`` chooses, which are written beside the figure. Relative error: rms of |measured - model| / |measured| over the lines.
+those that ``fit`` chooses, shown next to the error. Relative error: rms of |measured - model| / |measured| over the lines.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The recordings of real machines, axis by axis, as a command reads them; and tables about them on docs/real-machines.md."""
+"""The recordings of real machines, axis by axis, as a command reads them; and their tables in docs/real-machines.md."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
 
 PAGE = Path(__file__).parents[2] / "docs" / "real-machines.md"
-SHORT = ("hsm150/hsm_pos_0.06_1.npz",)  # recordings of the short forms: small ones
+SHORT = ("hsm150/hsm_pos_0.06_1.npz",)  # small recordings for --short
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One axis of a recording. runs: its stretches, or none and the reason why there are none."""
+    """One axis of a recording. runs: its stretches; empty with a reason."""
 
     name: str
     runs: tuple[Run, ...]
@@ -32,14 +32,14 @@ class Axis:
 
 
 def rows(short: bool) -> tuple[Shared, ...]:
-    """The recordings that are there; raises BadInput if there are none."""
+    """The available recordings; raises BadInput if there is no folder of them."""
     if not DATA.is_dir():
         raise BadInput("recordings of real machines", str(DATA), "a folder with them", "Say where they are with XY_SYSID_DATA.")
     return tuple(row for row in RECORDINGS if (DATA / row.path).exists() and (not short or row.path in SHORT))
 
 
 def asked(row: Shared) -> tuple[list[Path], Reading]:
-    """The path of a recording, and how a command reads it with the options of its row. Raises BadInput for options that mean nothing."""
+    """The path of a recording, and the options of its row for reading it. Raises BadInput for invalid options."""
     found: list[tuple[list[Path], Reading]] = []
     app = typer.Typer()
 
@@ -68,17 +68,17 @@ def axes(row: Shared) -> Iterator[Axis]:
 
 
 def markdown(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> str:
-    """A table."""
+    """A table as Markdown."""
     return "\n".join(f"| {' | '.join(row)} |" for row in (columns, ["---"] * len(columns), *cells))
 
 
 def between(page: str, name: str, made: str) -> str:
-    """The page with a table in its place, between the marks of this name."""
+    """The page with the table between the marks of this name replaced."""
     begin, end = f"<!-- made by python -m campaigns.bench {name} -->", f"<!-- end of {name} -->"
     before, rest = page.split(begin)
     return f"{before}{begin}\n\n{made.strip()}\n\n{end}{rest.split(end)[1]}"
 
 
 def written(name: str, made: str) -> None:
-    """Puts a table into docs/real-machines.md."""
+    """Write a table to docs/real-machines.md."""
     PAGE.write_text(between(PAGE.read_text(encoding="utf-8"), name, made), encoding="utf-8")

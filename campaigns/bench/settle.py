@@ -1,9 +1,9 @@
-"""python -m campaigns.bench settle: pairs of effects that one recording does not distinguish, and the experiments that do.
+"""python -m campaigns.bench settle: pairs of effects that one recording does not distinguish, and experiments that do.
 
-Each pair is drawn with either effect true. A short recording comes first. Then at most two designed experiments with 60 s of motion in all
-are run on the machine. For comparison one experiment of each way to choose is run for 60 s: the designed one, the D-optimal one and broadband
-noise, all chosen from the same beliefs. The seconds needed are those of its beginning that settle the case together with the first recording.
-Every case is a line of build/settle.jsonl, and the table is made from all lines there: a campaign that was stopped goes on.
+Each pair is simulated with either effect true. A short recording comes first. Then at most two designed experiments with 60 s of motion in total
+are run on the machine. For comparison one experiment of each method is run for 60 s: the designed one, the D-optimal one and broadband
+noise, all chosen with the same knowledge. The needed seconds are those from its start that settle the case together with the first recording.
+Every case is a line of build/settle.jsonl, and the table is made from all lines there, so a stopped campaign can continue.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from xy_sysid.experiment_design.proposals import neighbours, proposals
 PLACE = Path(os.environ.get("SETTLE_FILE", "build/settle.jsonl"))
 SEEDS = range(101, 102)  # never used to choose a number
 MOST = 60.0  # s of motion
-DRAWS = 4  # of the parameters of each set
-PARTS = (2.0, 4.0, 8.0, 16.0, 32.0, MOST)  # s of an experiment, from its beginning
+DRAWS = 4  # draws of the parameters of each set
+PARTS = (2.0, 4.0, 8.0, 16.0, 32.0, MOST)  # s of an experiment, from its start
 COLUMNS = (
     "pair",
     "one recording settles",
@@ -47,7 +47,7 @@ COLUMNS = (
 
 
 def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> NextChoice:
-    """Broadband noise, as loud as the limits allow for what is believed."""
+    """Broadband noise, as strong as the limits allow under the present knowledge."""
     for item in proposals(asked, setting.layout.sampling_rate):
         told = item.excitation
         broadband = told.kind == "noise" and told.slow == 0.0 and told.low == 0.1 and told.high > 50.0
@@ -57,7 +57,7 @@ def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> 
 
 
 def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> NextChoice:
-    """The experiment that makes the parameters of all sets known best, together; of the same candidates as ``design`` has."""
+    """The D-optimal experiment for the parameters of all sets together, from the same candidates as ``design``."""
     rate = setting.layout.sampling_rate
 
     def total(item: Experiment) -> float:
@@ -72,7 +72,7 @@ def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits)
     return NextChoice(min([best, *near])[2])
 
 
-QUICK = 5  # place of the pair that takes least time
+QUICK = 5  # index of the fastest pair
 WAYS: dict[str, Choose] = {"designed": best_design, "d_optimal": d_optimal, "noise": noise}
 
 
@@ -105,7 +105,7 @@ def case(pair: Pair, truth: int, seed: int) -> dict[str, Any]:
 
 
 def compared(pair: Pair, truth: int, seed: int) -> dict[str, Any]:
-    """The seconds needed by one experiment that is chosen in each way, infinite ones as None, with what it was."""
+    """The experiment of each method, and the seconds that it needs (None if it does not settle the case)."""
     made, asked = machine(pair, truth, seed), limits(pair)
     question = _question(pair, made, seed)
     chosen: dict[str, NextChoice] = {}
@@ -158,7 +158,7 @@ def table(lines: Sequence[dict[str, Any]]) -> str:
 
 
 def _needed(lines: Sequence[dict[str, Any]], way: str, together: bool) -> str:
-    """Seconds of each case, or of all together: their sum, those that were not settled counted as 60 s."""
+    """Seconds of each case, or the sum of all, in which an unsettled case counts as 60 s."""
     own = [line["ways"][way]["needed"] for line in lines if "ways" in line]
     if not own:
         return "-"
@@ -168,7 +168,7 @@ def _needed(lines: Sequence[dict[str, Any]], way: str, together: bool) -> str:
 
 
 def main(short: bool = False) -> None:
-    """Run what is not in the file yet, and print the table."""
+    """Run the cases that are not in the file yet, and print the table."""
     PLACE.parent.mkdir(exist_ok=True)
     seeds = [int(word) for word in os.environ.get("SETTLE_SEEDS", "").split(",") if word] or list(SEEDS)
     done = [json.loads(text) for text in PLACE.read_text(encoding="utf-8").splitlines()] if PLACE.exists() and not short else []

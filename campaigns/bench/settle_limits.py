@@ -1,6 +1,6 @@
-"""python -m campaigns.bench settle_limits: are experiments that are held to be within the limits within them on the machine itself?
+"""python -m campaigns.bench settle_limits: do experiments with predicted motion within the limits stay within them on the machine?
 
-For each draw of each pair, experiments are taken at random of those that keep within the limits by every model that the short recording allows;
+For each draw of each pair, experiments are drawn from those that keep the limits in every model that the short recording allows;
 the machine carries them out.
 """
 
@@ -19,12 +19,12 @@ from xy_sysid.experiment_design.rivals import beliefs_of, standing
 from xy_sysid.greybox.axis_data import prepare_all
 
 SEEDS = range(101, 103)
-EACH = 12  # experiments of each draw
+EACH = 12  # experiments for each draw
 SECONDS = 8.0
 
 
 def main(short: bool = False) -> None:
-    """Print how many were run, and how many left a limit."""
+    """Print the number of experiments, and of those that exceeded a limit."""
     ran = left = near = 0
     sys.stdout.write("Experiments that keep within the limits by every model that a short recording allows:\n\n")
     for pair in PAIRS[5:6] if short else PAIRS:

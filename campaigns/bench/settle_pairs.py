@@ -17,7 +17,7 @@ from xy_sysid.experiment_design.loop import Signals
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
-SMALLEST = 0.25  # of the sizes in the table, evenly by their logarithm
+SMALLEST = 0.25  # smallest factor on the sizes in the table, drawn uniformly on a log scale
 Parts = Mapping[str, Mapping[str, float]]
 
 
@@ -25,9 +25,9 @@ Parts = Mapping[str, Mapping[str, float]]
 class Pair:
     """One ambiguity.
 
-    sets: of effects, that which holds first; parts: of the machine, if the first or the second is true, with sizes that a draw multiplies
-    first: excitation of the recording that does not tell; seconds, skipped: of it, and left out at its begin
-    voltage, reach: V, and m to either side, that experiments may use; noise: of the encoder, a coarse one, m (rad of a joint)
+    sets: the two sets of effects; parts: of the machine if the first or the second is true, with sizes that a draw multiplies
+    first: excitation of the ambiguous recording; seconds, skipped: its length, and the part left out at its start
+    voltage, reach: limits of experiments, V, and m to either side; noise: of the (coarse) encoder, m (rad of a joint)
     """
 
     name: str
@@ -134,7 +134,7 @@ PAIRS = (
 
 
 class Rig(Protocol):
-    """A machine of one axis x: ``step`` as of ``excitation.lockstep.Machine``, and back to rest at the origin."""
+    """A machine with one axis x: ``step`` as in ``excitation.lockstep.Machine``, and a reset."""
 
     @property
     def rate(self) -> float:
@@ -152,7 +152,7 @@ class Rig(Protocol):
 
 
 def machine(pair: Pair, truth: int, seed: int) -> Rig:
-    """The machine of one axis where the first or the second set is true, its sizes drawn down to a quarter."""
+    """The machine with one axis whose first or second set is true, with drawn sizes down to a quarter."""
     random = np.random.default_rng([seed, truth])
     factor = float(SMALLEST ** random.uniform(0.0, 1.0))
     parts = {
@@ -168,12 +168,12 @@ def machine(pair: Pair, truth: int, seed: int) -> Rig:
 
 
 def limits(pair: Pair) -> MachineLimits:
-    """What experiments may ask of the machine of a pair."""
+    """The limits of experiments on the machine of a pair."""
     return MachineLimits(voltage=pair.voltage, travel=(-pair.reach, pair.reach))
 
 
 def recording(made: Rig, told: AxisExcitation, seconds: float) -> Signals:
-    """Voltage and position of an excitation from rest at the origin."""
+    """Voltage and position under an excitation, from rest at the origin."""
     made.reset()
     settings = ExcitationSettings(rate=made.rate, lockstep=True, speed=0.0, axes={"x": told})
     found = drive(made, settings, seconds)
@@ -181,7 +181,7 @@ def recording(made: Rig, told: AxisExcitation, seconds: float) -> Signals:
 
 
 def first_recording(pair: Pair, made: Rig, seed: int) -> Signals:
-    """The short one that does not tell."""
+    """The short, ambiguous recording."""
     ends = {"limit": pair.voltage, "travel_min": -pair.reach, "travel_max": pair.reach}
     voltage, position = recording(made, AxisExcitation(**{**ends, **pair.first, "seed": seed}), pair.seconds)
     begin = round(pair.skipped * made.rate)
@@ -189,11 +189,11 @@ def first_recording(pair: Pair, made: Rig, seed: int) -> Signals:
 
 
 def carry_out(made: Rig, experiment: Experiment) -> Signals:
-    """What an experiment records."""
+    """The recording of an experiment."""
     return recording(made, experiment.excitation, experiment.seconds)
 
 
 def left_limits(pair: Pair, recordings: Sequence[Signals]) -> int:
-    """Recordings in which the machine left its limits."""
+    """Number of recordings in which the machine exceeded its limits."""
     away = (np.max(np.abs(voltage)) > pair.voltage * (1 + 1e-9) or np.max(np.abs(position)) > pair.reach for voltage, position in recordings)
     return int(sum(away))

@@ -1,4 +1,4 @@
-"""python -m campaigns.bench settle_precision: are intervals as narrow as the experiment that was designed for them promised?"""
+"""python -m campaigns.bench settle_precision: are intervals as narrow as predicted by the experiment designed for them?"""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from xy_sysid.greybox.axis_data import prepare_all
 from xy_sysid.greybox.free_run import fit
 
 CASES = ((0, "coulomb_friction.coulomb", 0.002), (5, "pole", 0.0025), (5, "gain", 0.0004), (2, "constant_load.load", 0.003), (9, "pole", 0.002))
-SEEDS = (103, 104)  # never used while this was developed
-NEAR = 0.2  # part by which an interval may differ from the one that was expected
+SEEDS = (103, 104)  # never used during development
+NEAR = 0.2  # allowed relative difference of an interval from the predicted one
 COLUMNS = ("machine of", "parameter", "before", "asked for", "experiment", "seconds", "expected", "reached", "ratio")
 
 
 def main(short: bool = False) -> None:
-    """Print one line for each case, and how many reached what was expected."""
+    """Print one line for each case, and the number of cases that met the prediction."""
     rows, near = [], 0
     for place, name, width in CASES[1:2] if short else CASES:
         for seed in SEEDS[: 1 if short else None]:

@@ -1,4 +1,4 @@
-"""What a benchmark gives, and how times are taken."""
+"""Results of a benchmark, and measurement of times."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A measured number against its goal; ``met`` is None where there is no goal."""
+    """A measured number and its goal; ``met`` is None without a goal."""
 
     what: str
     measured: str
@@ -20,7 +20,7 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One benchmark's outcome; text: what was done, for the docs."""
+    """Result of one benchmark; text: its description, for the docs."""
 
     title: str
     text: str
@@ -30,7 +30,7 @@ class Table:
 
 
 def medians(works: dict[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Median time of each, s. They take turns, so that a slow moment of the machine hits all of them; the first turn warms up."""
+    """Median time of each, s. They run in turn, so that a slow period of the computer affects all; the first turn is a warm-up."""
     times: dict[str, list[float]] = {name: [] for name in works}
     for turn in range(repeats + 1):
         for name, work in works.items():

@@ -1,12 +1,12 @@
 """python -m campaigns.bench trend: false alarms, delay and coverage of the trend, on series of axes whose parameters wander.
 
 Weekly recordings of groups of 20 axes over a year. Seven parameters of each wander with the temperature of the hall (season and weather), with load
-and with lubrication (correlated from week to week), and one recording in a hundred is off by 20 %. Seeds are fixed.
-Beside it a plain CUSUM (two-sided, k = 0.5, mean and deviation of the first 12 recordings), whose limit is set so that it raises as many false
-alarms as are allowed, and two limits: that of any test, the likelihood ratio of the very step where the wander of the axis and the step's beginning
-and size are known; and that of the trend's own test if only the wander were known. Last the wear of two ball screws as published: 30 values of
+and with lubrication (correlated from week to week), and one recording in a hundred has an error of 20 %. Seeds are fixed.
+For comparison: a CUSUM (two-sided, k = 0.5, mean and deviation of the first 12 recordings), whose limit is set to the allowed number of false
+alarms, and two bounds: that of any test, the likelihood ratio of the true step with known wander, start
+and size; and that of the trend's own test with known wander. Finally the wear of two ball screws as published: 30 values of
 friction torque, 35 h apart, falling by 38 and 27 % with a scatter of 3 % (simulated from these figures, since the values themselves are not
-public). The trend learns how friction wanders from the other axes of the table, and the CUSUM's limit comes from such axes, too.
+public). The trend learns the wander of friction from the other axes of the table, and the CUSUM's limit comes from such axes, too.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from xy_sysid.samples.block import FloatArray
 
 BEGIN = datetime(2025, 1, 6, tzinfo=UTC)
 WEEKS, GROUP = 53, 20
-OFF = 0.01  # part of the recordings that are off, by 20 %
-STEP, SOON = 0.1, 3  # a change that must be found within so many recordings
-BASELINE = 12  # recordings that the CUSUM learns from
+OFF = 0.01  # fraction of the recordings with an error of 20 %
+STEP, SOON = 0.1, 3  # relative change, and the recordings within which it must be found
+BASELINE = 12  # recordings from which the CUSUM learns
 SCREWS = ((0.38, 0.03), (0.27, 0.03))  # fall, scatter
 
 
 @dataclass(frozen=True, slots=True)
 class Wander:
-    """How a parameter of an unchanged axis moves, parts of its value.
+    """Variation of a parameter of an unchanged axis, as fractions of its value.
 
     own: standard error of one recording; load: independent from one to the next; weather: correlated over weeks; season: amplitude over the year
     """
@@ -71,7 +71,7 @@ SCREW_HEADS = (
 
 
 def wandering(what: Wander, random: np.random.Generator, weeks: int = WEEKS, off: float = OFF) -> FloatArray:
-    """(n,) parts of the value, without and with the recording's own error beside each other: what a year looks like."""
+    """(n,) variation over a year, as fractions of the value, including outlying recordings."""
     weather = np.zeros(weeks)
     weather[0] = random.standard_normal()
     for week in range(1, weeks):  # correlated by 0.7 from week to week
@@ -96,14 +96,14 @@ def axis(number: int, seed: int, weeks: int = WEEKS) -> Axis:
 
 
 def until(one: Axis, count: int) -> Axis:
-    """Its first recordings."""
+    """The axis with its first recordings only."""
     cut = [replace(each, dates=each.dates[:count], value=each.value[:count], low=each.low[:count], high=each.high[:count]) for each in one.histories]
     return replace(one, dates=one.dates[:count], histories=tuple(cut))
 
 
 def false_alarms(groups: int, seed: int, weeks: int = WEEKS) -> tuple[int, float, dict[str, tuple[float, float]]]:
-    """Alarms on axes that do not change, axis-months, and by parameter how often the next recording is within the interval with the spread, and
-    within that of one recording alone."""
+    """Alarms on unchanged axes, axis-months, and for each parameter how often the next recording is within the interval with the spread, and
+    within the interval of one recording alone."""
     alarms, months = 0, 0.0
     inside: dict[str, list[tuple[bool, bool]]] = {}
     for group in range(groups):
@@ -120,7 +120,7 @@ def false_alarms(groups: int, seed: int, weeks: int = WEEKS) -> tuple[int, float
 
 
 def delays(what: Wander, before: int, times: int, seed: int) -> tuple[list[float], list[float]]:
-    """Recordings from a step of 10 % until it is declared, by the trend and by the CUSUM; infinite where it is not in ten."""
+    """Recordings from a step of 10 % until it is declared, by the trend and by the CUSUM; infinite if it is not within ten."""
     series = [_series(what, np.random.default_rng([seed, 1, k]), before) for k in range(GROUP)]
     weights = learned([evidence(one)[0] for one in series])
     level = np.log(AXIS_MONTHS * MONTH / 7.0 * len(PARAMETERS))
@@ -135,11 +135,11 @@ def delays(what: Wander, before: int, times: int, seed: int) -> tuple[list[float
 
 
 def limits(what: Wander, before: int, times: int, seed: int) -> tuple[float, float]:
-    """Part of the steps of ``delays`` that two other tests find within ``SOON`` recordings, with the same rate of false alarms.
+    """Fraction of the steps of ``delays`` that two other tests find within ``SOON`` recordings, with the same rate of false alarms.
 
-    The first is the most powerful of all: it knows the wander, when the step begins, and how large it is (Neyman and Pearson). The second is the
-    trend's if it knew the wander exactly: it does not know when, how much and how gradually the parameter changes, or which recordings are off.
-    Its series have no recordings that are off. NaN where its likelihood ratios are larger than numbers can be.
+    The first is the most powerful test: it knows the wander, and the start and size of the step (Neyman and Pearson). The second is the
+    trend's test with known wander, but unknown start, size and duration of the change, and unknown outliers.
+    Its series have no outliers. NaN if its likelihood ratios overflow.
     """
     count = before + SOON
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
@@ -147,7 +147,7 @@ def limits(what: Wander, before: int, times: int, seed: int) -> tuple[float, flo
     covariance = slow + (what.load**2 + what.own**2 + 1e-12) * np.eye(count)
     inverse = np.linalg.inv(covariance)
     step, one = np.log1p(STEP) * (np.arange(count) >= before), np.ones(count)
-    across = inverse - np.outer(inverse @ one, inverse @ one) / float(one @ inverse @ one)  # the level is not known
+    across = inverse - np.outer(inverse @ one, inverse @ one) / float(one @ inverse @ one)  # unknown level
     shapes, level = hypotheses(np.arange(count, dtype=np.float64)), np.log(AXIS_MONTHS * MONTH / 7.0 * len(PARAMETERS))
     best, known = [], []
     for k in range(times):
@@ -165,13 +165,13 @@ def _series(what: Wander, random: np.random.Generator, weeks: int, off: float = 
 
 
 def _first(alarm: NDArray[np.bool_], before: int) -> float:
-    """Recordings with the change until the first alarm."""
+    """Number of recordings from the change to the first alarm."""
     passed = np.flatnonzero(alarm[before:])
     return float(passed[0] + 1) if passed.size else np.inf
 
 
 def cusum(value: FloatArray) -> FloatArray:
-    """(n,) the larger of both sums of a series, in standard deviations; 0 while it learns. Page, Biometrika 41 (1954)."""
+    """(n,) the larger of both sums of a series, in standard deviations; 0 during the baseline. Page, Biometrika 41 (1954)."""
     mean, deviation = float(np.mean(value[:BASELINE])), float(np.std(value[:BASELINE], ddof=1))
     up, down, found = 0.0, 0.0, np.zeros(value.size)
     for place in range(BASELINE, value.size):
@@ -182,15 +182,15 @@ def cusum(value: FloatArray) -> FloatArray:
 
 
 def cusum_limit(what: Wander, seed: int, times: int = 4000, weeks: int = WEEKS, a_month: float = MONTH / 7.0, tests: int = len(PARAMETERS)) -> float:
-    """The limit at which a CUSUM raises one false alarm in 1,000 axis-months, shared by so many series."""
+    """The limit at which a CUSUM raises one false alarm in 1,000 axis-months, over ``tests`` series of an axis."""
     highest = [float(np.max(cusum(_series(what, np.random.default_rng([seed, 3, k]), weeks).value))) for k in range(times)]
     months = weeks / a_month
     return float(np.quantile(highest, max(1.0 - months / (AXIS_MONTHS * tests), 0.5)))
 
 
 def screws(times: int, seed: int) -> list[tuple[str, ...]]:
-    """Of each screw the median number of the value with which its wear is declared: by the trend, with and without other axes in the table, and by
-    a CUSUM whose limit is set on axes that wander as friction does, or only scatter."""
+    """For each screw the median number of the value with which its wear is declared: by the trend, with and without other axes in the table, and by
+    a CUSUM whose limit is set with axes that wander like friction, or have white noise."""
     lines = []
     a_month = MONTH * 24.0 / 35.0
     level = np.log(AXIS_MONTHS * a_month)
@@ -212,7 +212,7 @@ def screws(times: int, seed: int) -> list[tuple[str, ...]]:
 
 
 def screw_alarms(axes: int, seed: int) -> tuple[int, float]:
-    """False alarms and axis-months of unchanged axes that are recorded as the screws are, by the same weights and the same limit."""
+    """False alarms and axis-months of unchanged axes recorded like the screws, with the same weights and limit."""
     a_month = MONTH * 24.0 / 35.0
     known = learned([evidence(_series(FRICTION, np.random.default_rng([seed, 6, k]), 30))[0] for k in range(GROUP)])
     alarms = 0

@@ -1,13 +1,13 @@
-"""Is a machine better for it? Hidden machines, a minute of identification, then a path with three kinds of feedforward.
+"""Reduction of the tracking error: hidden machines, a minute of identification, then a path with three kinds of feedforward.
 
     python -m campaigns.bench use            60 axes; writes the table into docs/use.md
-    python -m campaigns.bench use --short    two of them, as the tests run it
+    python -m campaigns.bench use --short    two of them, as in the tests
 
-Each axis has one to three hidden effects: those of a simulated table, or of a joint or slide of MuJoCo. It is driven with noise for a minute, its
-model is searched, and it follows a path within the travel that it has seen, with (a) a PID that a relay experiment on the machine itself tunes by the
+Each axis has one to three hidden effects, of a simulated table, or of a joint or slide of MuJoCo. It is driven with noise for a minute, its
+model is identified, and it follows a path within the recorded travel, with (a) a PID tuned by a relay experiment on the machine and the
 rules of Ziegler and Nichols; (b) the same PID with kS, kV and kA; (c) the same PID with the compensation that is predicted to help; (d) our PID
-with its compensation. The error is where the axis truly is on the encoder's side (the table, where a gap lies between), from where the path begins to
-move. The seeds of the report were never tuned on. With XY_SYSID_KEPT=DIR the models are kept there, and a campaign that was ended goes on.
+with its compensation. The error is that of the true position on the encoder's side (the table, behind a gap), from the start of the motion of the
+path. The seeds of the report were never used for tuning. With XY_SYSID_KEPT=DIR the models are kept there, so a stopped campaign can continue.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from xy_sysid.samples.block import FloatArray
 SECONDS, SHORT_SECONDS = 60.0, 8.0  # of identification
 REPORT, FOREIGN, SHORT = range(9100, 9122), range(9200, 9216), range(12, 13)  # seeds of tables (two axes each), of MuJoCo, of the short form
 PLACES, BOUNDS = (0.0, 0.03, -0.02, 0.0), Bounds(0.06, 1.0, 50.0)
-FAR = 0.05  # m from the start, where a table ends
-WITHIN = 0.95  # of the travel that the recording has
-DRAWS = 6  # samples of the parameters that a compensation is judged by
+FAR = 0.05  # m from the start to the end of a table
+WITHIN = 0.95  # fraction of the recorded travel
+DRAWS = 6  # samples of the parameters for judging a compensation
 PAGE = Path(__file__).parents[2] / "docs" / "use.md"
 KINDS = ("PID", "kS kV kA", "compensated", "compensated, own PID")
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One axis: what was hidden in it, was found and is undone; rms tracking errors in the order of ``KINDS``; left: whether a limit was left."""
+    """One axis: its hidden, found and compensated effects; rms tracking errors in the order of ``KINDS``; left: True if it exceeded a limit."""
 
     name: str
     hidden: tuple[str, ...]
@@ -59,7 +59,7 @@ class Outcome:
 
 
 def outcomes(case: Case, seed: int, seconds: float = SECONDS, kept: Path | None = None) -> list[Outcome]:
-    """Every axis of a machine."""
+    """The outcome for every axis of a machine."""
     known = identify(case, seed, seconds, kept)
     rate, size, axes = case.machine.rate, case.size, case.machine.axes
     bounds = Bounds(size * BOUNDS.speed, size * BOUNDS.acceleration, size * BOUNDS.jerk)
@@ -95,7 +95,7 @@ def outcomes(case: Case, seed: int, seconds: float = SECONDS, kept: Path | None 
 
 
 def _chosen(of: Sequence[AxisModel], found: Gains, moves: Moves, controller: Controller, encoder: Encoder) -> tuple[SampledPath, Compensation]:
-    """The path and its compensation; kS, kV and kA on the path as it was asked for where the compensation is refused."""
+    """The path and its compensation; if the compensation is refused, the requested path with kS, kV and kA."""
     try:
         return compensate_within(of, found, moves, controller, encoder)
     except BadInput as refused:
@@ -107,24 +107,24 @@ def _chosen(of: Sequence[AxisModel], found: Gains, moves: Moves, controller: Con
 
 
 def _within(travel: tuple[float, float], size: float) -> list[float]:
-    """The places of the path, as far as they lie within the travel that the recording has."""
+    """The positions of the path, clipped to the recorded travel."""
     low, high = (WITHIN * end for end in travel)
     return [min(max(size * place, low), high) for place in PLACES]
 
 
 def _as_long(paths: Sequence[SampledPath]) -> list[SampledPath]:
-    """The paths, all as long as the longest: the others wait at their ends."""
+    """The paths, all extended to the longest; the others wait at their ends."""
     count = max(path.position.size for path in paths)
     return [of_position(_padded(path.position, count), path.sampling_rate) for path in paths]
 
 
 def _padded(values: FloatArray, count: int) -> FloatArray:
-    """The values, and the last of them until there are so many."""
+    """The values, with the last one repeated up to ``count``."""
     return np.concatenate((values, np.full(count - values.size, values[-1])))
 
 
 def _own(model: PhysicalModel, rate: float, otherwise: Controller) -> Controller:
-    """Our PID, for a reading that is a sample old; the other one where none has the margins."""
+    """Our PID, for a reading that is one sample old; the other controller if no PID has the margins."""
     try:
         return feedback(later(model, 1.0 / rate), rate, limit=LIMIT).controller
     except BadInput:
@@ -139,8 +139,8 @@ def _outcome(
     runs: Sequence[tuple[FloatArray, NDArray[np.bool_]]],
     far: float,
 ) -> Outcome:
-    """runs: of each kind where the axis was, and whether its drive was at the limit; far: m, the end of the table."""
-    begun = int(np.flatnonzero(path.speed)[0])  # until then a load has moved what nobody held
+    """The outcome of one axis. runs: for each kind the positions, and True where its drive was at the limit; far: m, the end of the table."""
+    begun = int(np.flatnonzero(path.speed)[0])  # before that a load moves the axis, because it is not controlled yet
     size = path.position.size
     errors = tuple(float(np.sqrt(np.mean((path.position - place[:size])[begun:] ** 2))) for place, _ in runs)
     place, full = runs[KINDS.index("compensated")]
@@ -149,7 +149,7 @@ def _outcome(
 
 
 def table(found: Sequence[Outcome], seconds: float = SECONDS) -> Table:
-    """The campaign's outcome."""
+    """The result of the campaign."""
     by_pid, by_simple = ([item.errors[2] / item.errors[k] for item in found] for k in (0, 1))
     rows = [
         (
@@ -175,7 +175,7 @@ def table(found: Sequence[Outcome], seconds: float = SECONDS) -> Table:
 
 
 def main(short: bool = False) -> None:
-    """Run the campaign and print its table; docs/use.md gets it unless it is short."""
+    """Run the campaign and print its table; if not short, write it to docs/use.md."""
     from campaigns.bench.__main__ import text
 
     kept = Path(folder) if (folder := os.environ.get("XY_SYSID_KEPT")) and not short else None

@@ -1,7 +1,7 @@
-"""Machines for ``campaigns.bench.use``: tables of ``xy_sim`` and joints of MuJoCo, a minute of noise, a PID of the shop floor, and a path.
+"""Machines for ``campaigns.bench.use``: tables of ``xy_sim`` and joints of MuJoCo, a minute of noise, a Ziegler-Nichols PID, and a path.
 
-Neither shares physics with the identification. The noise rides on a slow sine, so that it covers the travel on which the path will lie: a spring, a
-load and a table by position are known where the axis has been, and not beyond.
+Neither shares physics with the identification. A slow sine is added to the noise, so that the motion covers the travel of the path: a spring, a
+load and a position-dependent table are known only within the recorded travel.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from xy_sysid.settings import AxisExcitation, ExcitationSettings
 from xy_sysid.units import USUAL, Units
 
 LIMIT = 10.0  # V
-SLOW, SLOW_PERIOD, CENTRING = 0.35, 15.0, 8.0  # V, s and V/m: they take the table 30 to 40 mm to each side
+SLOW, SLOW_PERIOD, CENTRING = 0.35, 15.0, 8.0  # V, s and V/m: with these the table moves 30 to 40 mm to each side
 RELAY, RELAY_SECONDS, HYSTERESIS = 1.0, 4.0, 2e-6  # V, s, m: four counts
-HALVINGS = 8  # of the gains of a PID whose drive hums
-JOINT = 10.0  # rad of a joint for a metre of a table
+HALVINGS = 8  # most halvings of the gains of a PID that saturates its drive
+JOINT = 10.0  # rad of a joint per metre of a table
 FOREIGN = (
     ("hinge", ("gravity",)),
     ("slide", ("coulomb_friction",)),
@@ -50,7 +50,7 @@ SIZES = {"gravity": (0.1, 0.5), "coulomb_friction": (0.05, 0.4), "return_spring"
 
 
 class Driven(Protocol):
-    """What the campaign drives."""
+    """A machine of the campaign."""
 
     @property
     def axes(self) -> tuple[str, ...]: ...
@@ -65,7 +65,7 @@ class Driven(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A machine with its name; hidden: effects of each axis; size: rad or m of its path for a metre; units: of its recording."""
+    """A machine with its name; hidden: effects of each axis; size: rad or m of its path per metre; units: of its recording."""
 
     name: str
     machine: Driven
@@ -74,7 +74,7 @@ class Case:
     units: Units = USUAL
 
     def place(self, axis: str) -> float:
-        """Where an axis is on the encoder's side, or what it carries where a gap lies between, relative to the base, m or rad."""
+        """True position of an axis on the encoder's side (of the table, behind a gap), relative to the base, m or rad."""
         machine: Any = self.machine
         if isinstance(machine, MujocoMachine):
             return machine.place
@@ -84,7 +84,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Identified:
-    """Models of the axes, the travel (low, high) of each that the recording covers, m or rad, and the encoder as the recording shows it."""
+    """Models of the axes, recorded travel (low, high) of each, m or rad, and the encoder as estimated from the recording."""
 
     models: dict[str, PhysicalModel]
     travel: dict[str, tuple[float, float]]
@@ -109,7 +109,7 @@ def joint_case(seed: int) -> Case:
 
 
 def identify(case: Case, seed: int, seconds: float, kept: Path | None = None) -> Identified:
-    """The models after some seconds of noise. kept: folder for the recordings' travel and the models, so that a campaign can go on where it ended."""
+    """The models after some seconds of noise. kept: folder for the travel and the models, so that a stopped campaign can continue."""
     file = kept / f"{case.name.replace(' ', '_')}.yaml" if kept is not None else None
     machine, size = case.machine, case.size
     drawn = {
@@ -135,7 +135,7 @@ def identify(case: Case, seed: int, seconds: float, kept: Path | None = None) ->
 def followed(
     case: Case, paths: Sequence[SampledPath], extras: Sequence[FloatArray], controllers: Sequence[Controller]
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """(n, axes) where the axes are, m, and whether (n, axes) the drive was at its limit, each axis under its PID along its path."""
+    """(n, axes) true positions, m, and (n, axes) True where the drive was at its limit, each axis with its PID along its path."""
     machine = case.machine
     machine.reset()
     rate = machine.rate
@@ -149,7 +149,7 @@ def followed(
     shown = machine.step(held[None, :])[0]
     for k in range(count):
         place[k] = [case.place(axis) for axis in machine.axes]
-        error = wanted[max(k - 1, 0)] - shown  # the newest reading is of the sample before
+        error = wanted[max(k - 1, 0)] - shown  # the newest reading is that of the previous sample
         speed = keeps * speed + (1.0 - keeps) * (error - before) / h * (k > 0)
         before = error
         u = kp * error + total + kd * speed + extra[k]
@@ -161,7 +161,7 @@ def followed(
 
 
 def ziegler_nichols(case: Case, paths: Sequence[SampledPath]) -> list[Controller]:
-    """PID of every axis from a relay experiment; the gains are halved while that helps along the path of each axis (all of one length).
+    """PID of every axis from a relay experiment; the gains are halved while that helps along its path. All paths have one length.
 
     The relay has a hysteresis of a few counts of the encoder, and period and amplitude are medians over whole cycles. Without it the noise switches
     the relay inside a gap or before the axis breaks away, and the period is not that of the oscillation.
@@ -193,9 +193,9 @@ def _from_cycles(shown: FloatArray, rate: float, wide: float) -> Controller:
 
 
 def _calmed(case: Case, controllers: list[Controller], paths: Sequence[SampledPath]) -> list[Controller]:
-    """As anybody does whose drive hums: the gains are halved until the path keeps the drive away from its limit, and on while its error falls.
+    """Halve the gains until the drive is not at its limit along the path, and further while the error falls.
 
-    While an axis slides, its dry friction no longer damps what the relay has measured, so that the gains may be too high.
+    During sliding, dry friction adds less damping than in the relay experiment, so the gains may be too high.
     """
     best, error, loud = controllers, *_tried(case, controllers, paths)
     for _ in range(HALVINGS):
@@ -210,7 +210,7 @@ def _calmed(case: Case, controllers: list[Controller], paths: Sequence[SampledPa
 
 
 def _tried(case: Case, controllers: list[Controller], paths: Sequence[SampledPath]) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Tracking error of each axis along its path, m rms, and whether its drive was at the limit."""
+    """Tracking error of each axis along its path, m rms, and True if its drive was at the limit."""
     place, full = followed(case, paths, [np.zeros(path.position.size) for path in paths], controllers)
     wanted = np.array([path.position for path in paths]).T
     return np.asarray(np.sqrt(np.mean((wanted - place) ** 2, axis=0))), np.asarray(full.any(axis=0))

@@ -1,6 +1,6 @@
-"""A simulated year of a workshop: machines that are alike and not the same, their wander, and three that go bad in different ways.
+"""A simulated year of a workshop: similar machines, their wander, and three with different faults.
 
-Half of them stand on rock, the others on feet, so that their base swings near 48 Hz.
+Half of them are on rigid foundations, the others on feet, with a base resonance near 48 Hz.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 BEGIN = datetime(2025, 1, 6)
 YEAR = 365.0  # days
-WANDER = {"gain": 0.005, "pole": 0.02, "friction": 0.025, "frequency": 0.003}  # between recordings, part of the value
+WANDER = {"gain": 0.005, "pole": 0.02, "friction": 0.025, "frequency": 0.003}  # between recordings, fraction of the value
 SEASON = {"gain": 0.003, "pole": 0.02, "friction": 0.02, "frequency": 0.001}  # amplitude over the year, with the temperature of the hall
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What goes bad. begin: part of the year; friction, gain, frequency: factor at the end, reached over a tenth of a year; gap: m at the end."""
+    """A fault. begin: fraction of the year; friction, gain, frequency: factor at the end, reached over a tenth of a year; gap: m at the end."""
 
     name: str
     begin: float
@@ -47,7 +47,7 @@ FAULTS = {"mill-04": NUT, "mill-11": BOLTS, "mill-17": AMPLIFIER}
 
 @dataclass(frozen=True, slots=True)
 class Workshop:
-    """How much is simulated: machines, recordings of each over the year, and s of each."""
+    """Extent of the simulation: machines, recordings of each over the year, and s of each."""
 
     machines: int = 20
     recordings: int = 10
@@ -56,15 +56,15 @@ class Workshop:
     faults: dict[str, Fault] = field(default_factory=lambda: dict(FAULTS))
 
     def names(self) -> list[str]:
-        """Of the machines."""
+        """Names of the machines."""
         return [f"mill-{number + 1:02d}" for number in range(self.machines)]
 
     def days(self) -> list[datetime]:
-        """Of the recordings, evenly over the year."""
+        """Dates of the recordings, evenly over the year."""
         return [BEGIN + timedelta(days=round(YEAR * k / self.recordings)) for k in range(self.recordings)]
 
     def made(self, folder: Path) -> Iterator[Path]:
-        """Simulate and write every recording that is not there yet: MACHINE/DATE.npz."""
+        """Simulate and write every missing recording: MACHINE/DATE.npz."""
         for number, name in enumerate(self.names()):
             for k, day in enumerate(self.days()):
                 path = folder / name / f"{day:%Y-%m-%d}.npz"
@@ -73,7 +73,7 @@ class Workshop:
                 yield path
 
     def recording(self, number: int, k: int) -> Recording:
-        """What a machine is on a day, driven with noise."""
+        """The recording of a machine on a day, driven with noise."""
         name, part = self.names()[number], k / self.recordings
         own = np.random.default_rng([self.seed, number])
         usual = {
@@ -90,7 +90,7 @@ class Workshop:
         grown = min(max((part - fault.begin) / 0.1, 0.0), 1.0)
         for what, factor in (("friction", fault.friction), ("gain", fault.gain), ("frequency", fault.frequency)):
             now[what] *= 1.0 + grown * (factor - 1.0)
-        now["friction"] /= 1.0 + grown * (fault.gain - 1.0)  # counted in volts of a drive that gives less force for each
+        now["friction"] /= 1.0 + grown * (fault.gain - 1.0)  # in volts of a drive with less force per volt
         parts = {
             "time_delay": {"delay": delay},
             "coulomb_friction": {"coulomb": now["friction"]},
@@ -106,7 +106,7 @@ class Workshop:
 
 
 def _complete(parts: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
-    """With the usual values of what is not said."""
+    """The parts with default values for missing ones."""
     from xy_sim.machine_file import parts_from
 
     return {name: dict(values) for name, values in parts_from(parts, "workshop").items()}

@@ -1,4 +1,4 @@
-"""python -m campaigns.blind [SET ...] [OPTION ...]: hidden effects, and how often the diagnosis is right; --help says which options there are.
+"""python -m campaigns.blind [SET ...] [OPTION ...]: hidden effects, and how often the diagnosis is right; --help lists the options.
 
 Sets: exact, imperfect 0.2 %, imperfect 1 %, imperfect 3 %, clean dirt, outside, hard, two effects, three effects, first order,
 1 % two effects, 10 s, half, 5 um, quarter, tenth, 5 s, multisine, sweep, prbs, 1 kHz, 5 kHz;
@@ -18,8 +18,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "blind.md"
 
 
 def main() -> int:
-    """Run what was asked for; the page is written after every set."""
-    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy comes in: one core each
+    """Run the requested sets; the page is written after every set."""
+    for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # before numpy is imported: one core each
         os.environ.setdefault(threads, "1")
     import joblib
 

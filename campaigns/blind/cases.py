@@ -1,4 +1,4 @@
-"""Cases: one axis each, with a truth that the diagnosis is not told."""
+"""Cases: one axis each, with a truth that is hidden from the diagnosis."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ FURTHER = (  # laws that came later; gravity is drawn on the axes and joints of 
     "quadratic_drag",
     "return_spring",
 )
-BEHIND = {"load_side_resonance": "screw_compliance"}  # law -> part that is seen as this from the table
+BEHIND = {"load_side_resonance": "screw_compliance"}  # law -> part of the machine that appears as this law at the table's encoder
 OUTSIDE = ("loose_mode", "thermal_viscosity")
 AMOUNTS = (0.002, 0.01, 0.03)  # of dirt
-SMOOTH = 5.0  # inner steps per sample that will do for an axis without effects
+SMOOTH = 5.0  # sufficient inner steps per sample for an axis without effects
 FRICTION = ("coulomb_friction", "stribeck_friction", "presliding_hysteresis", "asymmetric_friction")
 
 Draws = Literal["development", "reporting"]
@@ -58,10 +58,10 @@ STREAMS = {"development": 11, "reporting": 1_000_003}
 class Case:
     """One axis.
 
-    group: set of the campaign; truth: effects to be named; number: of the draw; draws: which random stream
+    group: set of the campaign; truth: effects to be named; number: of the draw; draws: name of the random stream
     seconds, rate (Hz), strength: of the excitation; count: encoder count, m, or 0 for the machine's; size: of the effects
     kind: of the excitation; nuisance: with mild friction, a 1 um encoder and a tenth of another effect
-    dirt: part of the motion (of the axis without the truth) that a mixture of dirt changes; coarse: simulated in first-order steps
+    dirt: fraction of the motion (of the axis without the truth) that a mixture of dirt changes; coarse: simulated in first-order steps
     """
 
     group: str
@@ -80,12 +80,12 @@ class Case:
 
     @property
     def known(self) -> bool:
-        """False if a part is in it that no hypothesis describes."""
+        """False if the truth contains a part that no hypothesis describes."""
         return not set(self.truth) & set(OUTSIDE)
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name for people."""
         return f"{self.group}/{'+'.join(self.truth) or 'none'}/{self.number}"
 
     @property
@@ -142,16 +142,16 @@ class Case:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Of the dirt on it."""
+        """Kinds of its dirt."""
         return tuple(_dirt(self).parts) if self.dirt else ()
 
     @property
     def dirt_reached(self) -> float:
-        """Part of the motion that the dirt really changes."""
+        """Fraction of the motion that the dirt actually changes."""
         return _dirt(self).reached if self.dirt else 0.0
 
     def record(self) -> tuple[Machine, Recording]:
-        """Drive it."""
+        """The machine, and its recording."""
         machine = self.machine()
         return machine, self._driven(machine)
 
@@ -164,7 +164,7 @@ class Case:
 
 @lru_cache(maxsize=64)
 def _dirt(case: Case) -> Dirt:
-    """Scaled on the axis without the truth: beside a gap, any change of the motion grows to full size. What is left is smooth."""
+    """The dirt, scaled on the axis without the truth, because with a gap any change of the motion grows to full size. That axis is smooth."""
     spec = case.exact().with_parts(dict.fromkeys(case.parts, False)).spec
     machine = Machine(replace(spec, inner_rate=SMOOTH * case.rate))
     words = [int.from_bytes(text.encode(), "big") for text in (case.group, *case.truth)]
@@ -173,7 +173,7 @@ def _dirt(case: Case) -> Dirt:
 
 
 def standard(draws: Draws, each: int = 10, plain: int = 20) -> Iterator[Case]:
-    """Every effect, none, and what is outside the library."""
+    """Every effect, no effect, and parts outside the library."""
     for name in EFFECTS:
         yield from (Case("standard", (name,), k, draws) for k in range(each))
     yield from (Case("standard", (), k, draws) for k in range(plain))
@@ -181,7 +181,7 @@ def standard(draws: Draws, each: int = 10, plain: int = 20) -> Iterator[Case]:
 
 
 def varied(draws: Draws, group: str, each: int, **changes: Any) -> Iterator[Case]:
-    """Every effect under other circumstances."""
+    """Every effect with changed fields of ``Case``."""
     for name in EFFECTS:
         yield from (replace(Case(group, (name,), k, draws), **changes) for k in range(each))
 
@@ -192,7 +192,7 @@ def further(draws: Draws, each: int = 6) -> Iterator[Case]:
 
 
 def several(draws: Draws, count: int, cases: int, group: str = "", **changes: Any) -> Iterator[Case]:
-    """So many effects at once, never two of one family."""
+    """``count`` effects at once, never two of one family."""
     for k in range(cases):
         random = np.random.default_rng([STREAMS[draws], 5, count, k, *group.encode()])
         chosen: list[str] = []
@@ -204,12 +204,12 @@ def several(draws: Draws, count: int, cases: int, group: str = "", **changes: An
 
 
 def clean_dirt(draws: Draws, cases: int = 30) -> Iterator[Case]:
-    """Axes without an effect, with dirt; in blocks, so that any part of the set has all amounts."""
+    """Axes without an effect, with dirt, in blocks of equal amount."""
     yield from (Case("clean dirt", (), k, draws, dirt=AMOUNTS[k * len(AMOUNTS) // cases]) for k in range(cases))
 
 
 def outside(draws: Draws, cases: int = 30) -> Iterator[Case]:
-    """Axes with what is outside the library, some of them without dirt."""
+    """Axes with parts outside the library, some of them without dirt."""
     amounts = (0.0, *AMOUNTS)
     each = cases // len(OUTSIDE)
     for k in range(each * len(OUTSIDE)):
@@ -217,7 +217,7 @@ def outside(draws: Draws, cases: int = 30) -> Iterator[Case]:
 
 
 def sets(draws: Draws) -> dict[str, list[Case]]:
-    """The whole campaign, by set."""
+    """The full campaign, by set."""
     no_gap = [name for name in EFFECTS if name != "backlash"]
     return {
         "exact": list(standard(draws)),

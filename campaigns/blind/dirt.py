@@ -1,4 +1,4 @@
-"""Dirt: what an axis does beyond any law of the library, mixed at random and scaled to a part of its motion."""
+"""Dirt: a random mixture of small imperfections outside the laws of the library, scaled to a fraction of the motion."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ DIRT = (
     *("cable_pull", "uneven_lines", "mains_hum", "late_drive", "quadratic_drag"),
 )
 FEWEST, MOST = 3, 5  # kinds of dirt on one axis
-SPREAD = 0.7  # of the logarithm of their shares
-BAND = 700.0  # Hz, what is above does not count
-PROBE = 10.0  # s, for the shares; the whole is scaled on the whole record
-STEPS = 3  # corrections of the whole
-CLOSE = 0.03  # of the amount asked for, where correcting ends
+SPREAD = 0.7  # standard deviation of the logarithm of their shares
+BAND = 700.0  # Hz; higher frequencies do not count
+PROBE = 10.0  # s, for the shares; the mixture is scaled on the full record
+STEPS = 3  # most corrections of the mixture
+CLOSE = 0.03  # relative difference from the requested amount at which corrections end
 
 Parts = Mapping[str, Mapping[str, float]]
 
@@ -31,7 +31,7 @@ Parts = Mapping[str, Mapping[str, float]]
 class Dirt:
     """Parts of the dirt on one axis.
 
-    parts: part -> parameter -> value, SI; reached: rms of what they change in the velocity, over its rms
+    parts: part -> parameter -> value, SI; reached: rms of their change of the velocity, over its rms
     """
 
     parts: Parts
@@ -54,8 +54,8 @@ def moved(machine: Machine, voltage: FloatArray) -> FloatArray:
 def mixture(machine: Machine, voltage: FloatArray, amount: float, random: np.random.Generator) -> Dirt:
     """Random dirt that changes the motion of ``machine`` (one axis, without the effects to be found) by ``amount``.
 
-    voltage: (n,) V, what it will be driven with. Each kind is first given a random share, from a short run with it alone; then
-    all are scaled together until the whole record is changed by what was asked for.
+    voltage: (n,) V, its input. Each kind first gets a random share, from a short run with it alone; then
+    all are scaled together until the full record changes by the requested amount.
     """
     present = set(machine.spec.axes[0].parts)
     kinds = random.permutation([name for name in DIRT if name not in present])[: int(random.integers(FEWEST, MOST + 1))]
@@ -78,7 +78,7 @@ def mixture(machine: Machine, voltage: FloatArray, amount: float, random: np.ran
 
 
 def scaled(part: Part, values: Mapping[str, float], scale: float) -> dict[str, float]:
-    """The same part, so many times as large, by each parameter's ``power``; within what is allowed."""
+    """The values of a part scaled by ``scale`` to each parameter's ``power``, within its limits."""
     powers = [(1.0 if place == 0 else 0.0) if item.power is None else item.power for place, item in enumerate(part.parameters)]
     return {
         item.name: min(max(values[item.name] * scale**power, item.minimum), item.maximum) for item, power in zip(part.parameters, powers, strict=True)

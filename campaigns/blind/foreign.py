@@ -1,7 +1,7 @@
-"""Axes and robot joints of MuJoCo, with effects that the diagnosis is not told: other equations, friction, contact and integrators than ``xy_sim``.
+"""Axes and robot joints of MuJoCo, with hidden effects: other equations, friction, contact and integrators than ``xy_sim``.
 
 Extra ``foreign`` (pip install '.[foreign]'). An axis is a DC motor, V to rad, driven with noise in open loop, or following a random path in closed
-loop. A joint is driven by a current under a position controller, A to rad, along a slow path; its samples come at uneven times.
+loop. A joint is driven by a current under a position controller, A to rad, along a slow path; its samples are unevenly spaced.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ ALSO = {  # bristles are dry friction, too; friction with a load is asymmetric f
 }
 SECONDS = 30.0  # of an axis
 SLOW = 60.0  # s of a joint
-STEP = 5e-5  # s between two steps of MuJoCo, at most
+STEP = 5e-5  # s, longest step of MuJoCo
 LARGEST = 12.0  # V
-MASS, ARM = 1e-6, 0.05  # kg and m of a pendulum: its inertia is nothing beside the motor's
+MASS, ARM = 1e-6, 0.05  # kg and m of a pendulum: its inertia is negligible compared with the motor's
 XML = """
 <mujoco>
   <option timestep="{step}" integrator="{integrator}" gravity="{gravity} 0 0" iterations="200" tolerance="1e-14"/>
@@ -91,7 +91,7 @@ JOINTS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Foreign:
-    """One axis or joint. kind: of AXES or JOINTS; number: of the draw; draws: which random stream."""
+    """One axis or joint. kind: of AXES or JOINTS; number: of the draw; draws: name of the random stream."""
 
     kind: str
     loop: Loop
@@ -105,20 +105,20 @@ class Foreign:
 
     @property
     def group(self) -> str:
-        """Set of the campaign."""
+        """The set of the campaign."""
         return GROUPS[self.loop]
 
     known, nuisance, dirt = True, False, 0.0  # as of ``cases.Case``
 
     @property
     def there(self) -> set[str]:
-        """Names that are no phantom: the truth, laws with the same equations, and laws of which it has a part."""
+        """Names that are not phantoms: the truth, laws with the same equations, and laws that contain a part of it."""
         own = {other.name for name in self.truth for other in (STANDARD[name], *equals(STANDARD, name))}
         return own | {name for part in self.truth for name in ALSO.get(part, ())}
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name for people."""
         return f"{self.group}/{self.kind}/{self.number}"
 
     def random(self) -> np.random.Generator:
@@ -141,7 +141,7 @@ class _Engine:
 
     @staticmethod
     def of(rate: float, **words: Any) -> _Engine:
-        """words: numbers and texts of XML; those that are not given are 0 or empty."""
+        """words: numbers and texts of the XML; missing ones are 0 or empty."""
         module = importlib.import_module("mujoco")
         steps = math.ceil(1.0 / (rate * STEP))
         step = 1.0 / (rate * steps)
@@ -151,18 +151,18 @@ class _Engine:
         return _Engine(model, module.MjData(model), module, steps)
 
     def advance(self, *controls: float) -> None:
-        """By one sample. controls: torque at the joint, N m, and what else drives it."""
+        """Simulate one sample. controls: torque at the joint, N m, and other actuators."""
         self.data.ctrl[: len(controls)] = controls
         self.module.mj_step(self.model, self.data, self.steps)
 
     @property
     def angle(self) -> float:
-        """Of the joint, rad."""
+        """Angle of the joint, rad."""
         return float(self.data.qpos[0])
 
 
 def _axis(case: Foreign) -> tuple[float, FloatArray, FloatArray, Units]:
-    """A DC motor. torque: that of a voltage's rms at standstill; its parts are what effects take of it."""
+    """A DC motor. Effects are sized as fractions of the torque of the rms voltage at standstill."""
     random = case.random()
     rate = 2000.0 if case.kind == "gap" else float(random.choice([500.0, 1000.0, 2000.0]))
     count = 2.0 * math.pi / float(random.choice([4096, 16384, 65536]))
@@ -172,7 +172,7 @@ def _axis(case: Foreign) -> tuple[float, FloatArray, FloatArray, Units]:
     pole = float(np.exp(random.uniform(math.log(8.0), math.log(60.0))))
     damping = float(random.uniform(0.1, 0.5)) * constant**2
     inertia = (constant**2 + damping) / pole
-    speed = torque / (constant**2 + damping)  # of a steady voltage
+    speed = torque / (constant**2 + damping)  # at a constant voltage
     part = float(random.uniform(0.08, 0.3))
     words: dict[str, Any] = {"damping": damping, "inertia": inertia}
     limit, motor, steady = LARGEST, {"motorconst": f"{constant}", "resistance": "1"}, 0.0
@@ -191,18 +191,18 @@ def _axis(case: Foreign) -> tuple[float, FloatArray, FloatArray, Units]:
     elif case.kind == "pendulum":
         words |= {"mass": MASS, "arm": ARM, "gravity": 3.0 * part * torque / (MASS * ARM), "inertia": inertia - MASS * ARM**2}
     elif case.kind in ("spring", "cubic_spring"):
-        words["stiffness" if case.kind == "spring" else "cubic"] = 3.0 * part * torque  # at 1 rad, about the farthest that the axis goes
+        words["stiffness" if case.kind == "spring" else "cubic"] = 3.0 * part * torque  # at 1 rad, about the largest position
     elif case.kind == "limit":
         limit = rms * float(random.uniform(0.7, 1.4))
     elif case.kind in ("two_masses", "gap"):
-        ratio = float(random.uniform(0.35, 0.75))  # of the motor's side
+        ratio = float(random.uniform(0.35, 0.75))  # the motor's part
         words["inertia"] = ratio * inertia
         far = (1.0 - ratio) * inertia
         if case.kind == "two_masses":
             omega = 2.0 * math.pi * float(np.exp(random.uniform(math.log(8.0), math.log(60.0))))
             joint = f'stiffness="{far * omega**2}" damping="{2.0 * float(random.uniform(0.01, 0.05)) * far * omega}"'
         else:
-            gap = max(8.0 * count, float(random.uniform(3.0, 12.0)) * 0.25 * speed / rate)  # wider than the usual way in a sample
+            gap = max(8.0 * count, float(random.uniform(3.0, 12.0)) * 0.25 * speed / rate)  # wider than the typical motion in a sample
             omega = 2.0 * math.pi * float(np.exp(random.uniform(math.log(300.0), math.log(900.0))))
             joint = f'limited="true" range="{-0.5 * gap} {0.5 * gap}" solreflimit="{-(omega**2)} {-2.0 * float(random.uniform(0.05, 0.4)) * omega}"'
             joint += ' solimplimit="0.95 0.95 1e-9"'
@@ -288,7 +288,7 @@ def _fourier(random: np.random.Generator, rate: float, samples: int) -> FloatArr
 
 
 def _moves(random: np.random.Generator, rate: float, samples: int) -> FloatArray:
-    """(samples,) moves between random places with trapezoids of speed, and short rests."""
+    """(samples,) moves between random positions with trapezoidal speed, and short rests."""
     places: list[float] = [0.0]
     fast, harder = float(random.uniform(0.5, 1.5)), float(random.uniform(2.0, 5.0))
     while len(places) < samples:
@@ -307,7 +307,7 @@ def _moves(random: np.random.Generator, rate: float, samples: int) -> FloatArray
 
 
 def run(case: Foreign) -> Judged:
-    """Drive, diagnose, judge: the effects of several are all to be named, and one first."""
+    """Drive, diagnose and judge; with several effects, all must be named, one of them first."""
     rate, voltage, position, units = case.record()
     begun = time.process_time()
     ready = prepared(rate, [(voltage, position)], units=units)
@@ -322,12 +322,12 @@ def run(case: Foreign) -> Judged:
 
 
 def judged(case: Case | Foreign, folder: Path | None = None) -> Judged:
-    """What came of any case. folder: of recordings that are kept, of machines of ``xy_sim``."""
+    """The result of any case. folder: for recordings of machines of ``xy_sim``, which are kept."""
     return run(case) if isinstance(case, Foreign) else judge.run(case, folder)
 
 
 def foreign(draws: Draws, each: int = 4) -> dict[str, list[Foreign]]:
-    """The sets, by name; of each kind so many."""
+    """The sets by name, with ``each`` cases of each kind."""
     return {
         group: [Foreign(kind, loop, k, draws) for kind in (JOINTS if loop == "joint" else AXES) for k in range(each)]
         for loop, group in GROUPS.items()

@@ -1,4 +1,4 @@
-"""One case, from the drive to the verdict on the verdict."""
+"""One case: drive, diagnosis, and comparison with the truth."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from xy_sysid.greybox.free_run import EPSILON, fit, prepare
 from xy_sysid.greybox.score_test import bounded
 
 CONFIDENT = 0.9
-FAINT = 0.1  # of noise and dirt together: what changes the motion less can hardly be seen in 60 s
+FAINT = 0.1  # fraction of noise and dirt together: a smaller change of the motion can hardly be detected in 60 s
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What came of one case.
+    """The result of one case.
 
-    right:    the truth was said: every effect (and, of one effect, only that), nothing, or not in the library
+    right:    the answer is correct: every effect (if there is one, only that), nothing missing, or not in the library
     first:    the first name is one of the truth's
     wrong:    a name that is not in the truth came first, with confidence
-    phantoms: names, wherever they came, of what is not on the axis, whatever the confidence
-    ratio:    held-out error over that of a fit that began at the truth; for backlash innovation over noise; None if not named
-    errors:   parameter -> relative error; inside: parameter -> is the truth in its 95 % interval
+    phantoms: named effects that are not on the axis, at any place and with any confidence
+    ratio:    held-out error over that of a fit started at the truth; for backlash innovation over noise; None if not named
+    errors:   parameter -> relative error; inside: parameter -> True if the truth is in its 95 % interval
     change, noise, dirt, kinds: see ``recordings.Seen``
     """
 
@@ -56,17 +56,17 @@ class Judged:
 
     @property
     def phantom(self) -> bool:
-        """Something is named with confidence that is not there."""
+        """True if an effect that is not on the axis is named with confidence."""
         return bool(self.phantoms) and self.confidence >= CONFIDENT
 
     @property
     def hidden(self) -> bool:
-        """An effect of the truth changes the motion so little that hardly anybody could see it beside noise and dirt."""
+        """True if an effect of the truth changes the motion too little to be detected in noise and dirt."""
         return bool(self.change) and min(self.change.values()) < FAINT * math.hypot(self.noise, self.dirt)
 
 
 def run(case: Case, folder: Path | None = None) -> Judged:
-    """Drive (or take the recording from the folder), diagnose, judge."""
+    """Drive (or read the recording from the folder), diagnose and judge."""
     recording = recorded(case, folder)
     machine, seen = case.exact(), recording.seen
     u, y = recording.voltage, recording.position
@@ -93,12 +93,12 @@ def run(case: Case, folder: Path | None = None) -> Judged:
 
 
 def names(found: Answer) -> tuple[str, ...]:
-    """What a diagnosis names as missing."""
+    """The effects that a diagnosis names as missing."""
     return found.effects if found.verdict == "missing_effect" else ()
 
 
 def outcome(case: Any, found: Answer, seconds: float, *, right: bool, first: bool, stray: bool, phantoms: tuple[str, ...]) -> Judged:
-    """A diagnosis that was judged. stray: a name that is not in the truth came first."""
+    """The result of a diagnosis. stray: True if the first name is not in the truth."""
     return Judged(
         case=case,
         verdict=found.verdict,
@@ -113,19 +113,19 @@ def outcome(case: Any, found: Answer, seconds: float, *, right: bool, first: boo
 
 
 def laws(names: tuple[str, ...]) -> set[str]:
-    """Names, with those that are the sum of others taken apart: no data can tell these from the others together."""
+    """Names, with those that equal a sum of others replaced by these: no data distinguish the two."""
     sums = {name: whole.parts for name in names if name in STANDARD.effects and (whole := STANDARD[name].sum_of)}
     return {part for name in names for part in sums.get(name, (name,))}
 
 
 def _there(case: Case, machine: Machine, dirt: tuple[str, ...]) -> set[str]:
-    """Laws of every part of the machine and of its dirt; whatever dry friction slides with its constant level."""
+    """Laws of every part of the machine and of its dirt; any dry friction includes Coulomb friction."""
     parts = (set(machine.spec.axes[0].parts) - set(case.parts)) | {*case.truth, *dirt}
     return laws(tuple(parts)) | parts | ({FRICTION[0]} if parts & set(FRICTION) else set())
 
 
 def true_values(case: Case, machine: Machine) -> dict[str, float]:
-    """What the hypothesis should find, by ``effect.parameter``."""
+    """The true parameters of the hypothesis, by ``effect.parameter``."""
     axis, truth = machine.spec.axes[0], machine.truth("x")
     values: dict[str, float] = {}
     for name, part in zip(case.truth, case.parts, strict=True):
@@ -163,7 +163,7 @@ def _measured(case: Case, machine: Machine, fs: float, u: Any, y: Any, found: An
         inside[key] = estimate.low <= value <= estimate.high
     if case.truth == ("backlash",):
         return final.held_out_error / final.noise_floor, errors, inside
-    if not case.truth or case.dirt > 0.0:  # the best fit of a dirty axis does not begin at the truth
+    if not case.truth or case.dirt > 0.0:  # with dirt, the truth is not the best start
         return None, errors, inside
     model, data = final.model, prepare(fs, np.asarray(u), np.asarray(y), EPSILON)
     for name in case.truth:

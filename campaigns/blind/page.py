@@ -1,4 +1,4 @@
-"""docs/blind.md from what came of the cases."""
+"""docs/blind.md from the results of the cases."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ WORDS = {
     "foreign joints": "robot joints of MuJoCo, current to angle, along slow paths",
     "prbs": "PRBS",
 }
-REMARKS = "\n## Remarks\n"  # from here on people write, and the command leaves it
+REMARKS = "\n## Remarks\n"  # the text from here on is written by people, and kept
 GOALS = {
     "imperfect 0.2 %": 97,
     "imperfect 1 %": 95,
@@ -51,7 +51,7 @@ BINS = (0.0, 0.3, 0.5, 0.7, 0.9, 0.99, 1.0)  # of confidence; the last one is cl
 
 
 def text(results: dict[str, list[Judged]], draws: str, command: str, facts: str) -> str:
-    """The whole page."""
+    """The full page."""
     head = [
         "# Blind campaigns",
         "",
@@ -135,7 +135,7 @@ def _reliability(results: dict[str, list[Judged]]) -> list[str]:
 
 
 def with_remarks(made: str, old: str) -> str:
-    """The page, with the remarks that people wrote at the end of the old one."""
+    """The page, with the remarks at the end of the old one."""
     _, mark, remarks = old.partition(REMARKS)
     return f"{made}\n{mark.lstrip()}{remarks}" if mark else made
 
@@ -168,7 +168,7 @@ def _confusion(items: Sequence[Judged]) -> list[str]:
 
 
 def hit(item: Judged) -> bool:
-    """Right for the set that it is of."""
+    """True if the result is right by the rule of its set."""
     if not item.case.known or (item.case.dirt and not item.case.truth):
         return not (item.verdict == "missing_effect" and item.confidence >= CONFIDENT)
     alone = len(item.case.truth) == 1 and not item.case.nuisance and item.case.group != "standard"

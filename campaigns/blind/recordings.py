@@ -1,4 +1,4 @@
-"""Recordings of cases, and what can be seen in them; kept in a folder, so that another campaign need not simulate them again."""
+"""Recordings of cases, and the visibility of effects in them; kept in a folder for the next campaign."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """How much of the motion is due to what: rms of the change in velocity over its rms.
+    """Contributions to the motion: rms of the change in velocity over its rms.
 
-    change: effect of the truth -> by taking it away; noise: by the encoder; dirt: by the dirt, on the axis without the truth
-    kinds:  of the dirt
+    change: effect of the truth -> change without it; noise: of the encoder; dirt: of the dirt, on the axis without the truth
+    kinds:  kinds of dirt
     """
 
     change: dict[str, float]
@@ -32,7 +32,7 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One case, driven: rate (Hz), voltage (n,), V, position (n,), m."""
+    """Recording of a case: rate (Hz), voltage (n,), V, position (n,), m."""
 
     rate: float
     voltage: FloatArray
@@ -41,12 +41,12 @@ class Recorded:
 
 
 def recorded(case: Case, folder: Path | None = None) -> Recorded:
-    """Drive it, or take it from the folder, where it is put if it was not there."""
+    """The recording of a case, from the folder if it is there; otherwise it is simulated and stored there."""
     path = folder / file_name(case) if folder else None
     if path is not None and path.exists():
         try:
             return _read(path)
-        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):  # of a run that was killed
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):  # file of a killed run
             path.unlink()
     found = _simulated(case)
     if path is not None:
@@ -59,7 +59,7 @@ def recorded(case: Case, folder: Path | None = None) -> Recorded:
 
 
 def file_name(case: Case) -> str:
-    """By the case and its machine; what the laws of the machine do is not in it: empty the folder when they change."""
+    """A name from the case and its machine, but not from the machine's laws: empty the folder when they change."""
     key = hashlib.sha256(repr((case, case.exact().spec)).encode()).hexdigest()[:12]
     return f"{re.sub('[^a-z0-9]+', '_', f'{case.draws} {case.name}'.lower())}_{key}.npz"
 

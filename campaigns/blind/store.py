@@ -1,4 +1,4 @@
-"""What came of cases, kept in a file of one JSON line each, so that a campaign can be stopped and gone on with."""
+"""Results of cases in a file with a JSON line for each, so that a stopped campaign can continue."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from campaigns.blind.judge import Judged
 
 
 def load(path: Path) -> dict[Case | Foreign, Judged]:
-    """Every case of the file that was judged to its end; none if there is no file."""
+    """Every complete result in the file; empty without a file."""
     found: dict[Case | Foreign, Judged] = {}
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
         try:
             row = json.loads(line)
-        except ValueError:  # the last line of a run that was killed
+        except ValueError:  # last line of a killed run
             continue
         words, truth = row.pop("case"), tuple(row.pop("truth"))
         case = Foreign(**words) if "loop" in words else Case(**words | {"truth": truth})
@@ -28,7 +28,7 @@ def load(path: Path) -> dict[Case | Foreign, Judged]:
 
 
 def add(path: Path, item: Judged) -> None:
-    """One more line."""
+    """Append one result."""
     row = asdict(item)
     row["truth"] = list(row["case"].pop("truth", ()))
     with path.open("a", encoding="utf-8") as file:

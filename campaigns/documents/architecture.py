@@ -1,4 +1,4 @@
-"""The picture of the packages, docs/pictures/packages.svg, made from what the files import.
+"""The picture of the packages, docs/pictures/packages.svg, generated from the imports.
 
 python -m campaigns.documents.architecture           # the picture
 python -m campaigns.documents.architecture --write   # write it into its file
@@ -16,7 +16,7 @@ from campaigns.documents.layers import svg
 from xy_sysid.errors import BadInput
 
 PICTURE = "docs/pictures/packages.svg"
-COMMON = ("errors", "settings", "units", "jit", "tables")  # what everybody imports, so that it tells nothing
+COMMON = ("errors", "settings", "units", "jit", "tables")  # imported by nearly all packages, and not drawn
 FLOORS = {
     "what arrives": ("samples", "excitation"),
     "in frequency": ("response", "linear", "fitting"),
@@ -28,7 +28,7 @@ FLOORS = {
 
 
 def imports(package: Path) -> dict[tuple[str, str], int]:
-    """(who, whom) -> number of files of package ``who`` that import from package ``whom``, but for those that everybody imports."""
+    """(who, whom) -> number of files of package ``who`` that import from package ``whom``, without ``COMMON``."""
     counted: Counter[tuple[str, str]] = Counter()
     for path in sorted(package.rglob("*.py")):
         parts = path.relative_to(package).parts
@@ -45,7 +45,7 @@ def imports(package: Path) -> dict[tuple[str, str], int]:
 
 
 def reduced(edges: Mapping[tuple[str, str], int]) -> list[tuple[str, str]]:
-    """The edges that no longer way says already: what is imported only through others is not drawn twice."""
+    """The edges without those that a longer path implies (transitive reduction), as (imported, importing)."""
     after: dict[str, set[str]] = {}
     for who, whom in edges:
         after.setdefault(whom, set()).add(who)
@@ -64,7 +64,7 @@ def reduced(edges: Mapping[tuple[str, str], int]) -> list[tuple[str, str]]:
 
 
 def picture(package: Path) -> str:
-    """An SVG: an arrow goes from what is imported to what imports it, so that it follows the data."""
+    """An SVG: arrows lead from the imported to the importing package, in the direction of the data."""
     edges = imports(package)
     known = [name for names in FLOORS.values() for name in names]
     there = sorted(path.parent.name for path in package.glob("*/__init__.py"))

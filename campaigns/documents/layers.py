@@ -1,7 +1,7 @@
-"""A directed graph as an SVG: each node in the layer after all that lead to it, and curved arrows that follow the data downwards.
+"""A directed graph as an SVG: each node is in the layer after all its predecessors, with curved arrows downwards.
 
-Sugiyama, Tagawa, Toda (1981): layers by longest path, long arrows kept apart by points in the layers that they cross, and each layer
-ordered by the mean place of its neighbours.
+Sugiyama, Tagawa, Toda (1981): layers by longest path, long arrows separated by points in the layers that they cross, and each layer
+ordered by the mean position of its neighbours.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Point = tuple[str, int]  # a node, or an arrow, in its layer
 
 
 def layers(nodes: Sequence[str], edges: Sequence[tuple[str, str]]) -> dict[str, int]:
-    """node -> number of arrows of the longest way to it. The graph has no circle."""
+    """node -> number of arrows on the longest path to it. The graph must be acyclic."""
     found = dict.fromkeys(nodes, 0)
     for _ in nodes:
         for start, end in edges:

@@ -1,4 +1,4 @@
-"""What docs/machines.md says about files, keys and parts, made from these: python -m campaigns.documents.machines"""
+"""The tables of files, keys and parts in docs/machines.md, generated from these: python -m campaigns.documents.machines"""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
 
 
 def files() -> str:
-    """The machine files that come with the package: what they are, and what is on each axis."""
+    """The machine files of the package, with a description and the parts of each axis."""
 
     def parts(spec: Spec) -> str:
         return "; ".join(f"{axis.name}: {', '.join(axis.parts)}" for axis in spec.axes) + (", and drawn ones" if spec.hidden is not None else "")
@@ -72,7 +72,7 @@ SECTIONS = {"files": files, "drive": drive, "couplings": couplings, "parts": par
 
 
 def refreshed(text: str) -> str:
-    """The document with everything between ``<!-- NAME -->`` and ``<!-- end NAME -->`` made anew."""
+    """The document with everything between ``<!-- NAME -->`` and ``<!-- end NAME -->`` generated again."""
     for name, make in SECTIONS.items():
         before, _, rest = text.partition(f"<!-- {name} -->")
         _, _, after = rest.partition(f"<!-- end {name} -->")

@@ -22,7 +22,7 @@ EXIT = {
 
 
 def plain(text: str) -> str:
-    """Text for troff: backslashes and hyphens as they are, and no line that begins as a request."""
+    """Text for troff: escaped backslashes and hyphens, and no line that begins like a request."""
     text = " ".join(text.split()).replace("\\", "\\e").replace("-", "\\-")
     return f"\\&{text}" if text.startswith((".", "'")) else text
 

@@ -1,8 +1,8 @@
-"""The table of docs/use.md: each effect of the library, and what MuJoCo's language loses of it.
+"""The table of docs/use.md: each effect of the library, and its loss in MJCF.
 
     python -m campaigns.documents.mjcf      prints the table
 
-Each effect is exported alone with its usual numbers, so the table says what the export itself says.
+Each effect is exported alone with typical values; the table contains the words of the export.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ NOTHING = "nothing"
 
 
 def lost(name: str) -> str:
-    """What an export loses of an effect, in its own words; ``NOTHING``, or why there is no export."""
+    """The loss of an effect in an export, in its own words; ``NOTHING``, or why there is no export."""
     try:
         made = mjcf(BASE.with_effect(name), RATE)
     except BadInput as refused:

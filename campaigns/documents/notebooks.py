@@ -1,4 +1,4 @@
-"""The examples as notebooks with their outputs: run in a kernel, shown by the site without a network, and downloaded as .ipynb.
+"""The examples as notebooks with their outputs: run in a kernel, shown by the site offline, and downloaded as .ipynb.
 
 Each paragraph of a script is a cell; ``write_html`` of a picture is left out, so that the picture is the output of its cell.
 """
@@ -16,11 +16,11 @@ from typing import Any
 
 SHOWN = re.compile(r"\.write_html\([^)]*\)")
 PLOT = "application/vnd.plotly.v1+json"
-PATIENCE = 600  # s for a cell; the first one that simulates compiles the laws
+PATIENCE = 600  # s for a cell; the first simulation compiles the laws
 
 
 def cells(source: str) -> tuple[str, list[str]]:
-    """(what the docstring says, the code of each cell) of a script: statements without an empty line between them are one cell,
+    """(docstring, code of each cell) of a script: statements without an empty line between them are one cell,
     which ends with its picture."""
     tree = ast.parse(source)
     lines = source.splitlines()
@@ -40,7 +40,7 @@ def cells(source: str) -> tuple[str, list[str]]:
 
 
 def executed(script: Path, files: Mapping[str, str] | None = None) -> Any:
-    """The notebook of a script with its outputs, run in an empty folder with these files. Raises nbclient's error where a cell fails."""
+    """The notebook of a script with its outputs, run in an empty folder with these files. Raises nbclient's error if a cell fails."""
     from nbclient import NotebookClient
     from nbformat import v4
 
@@ -66,7 +66,7 @@ def executed(script: Path, files: Mapping[str, str] | None = None) -> Any:
 
 
 def markdown(notebook: Any, name: str) -> str:
-    """The notebook as a part of a page: code, what it printed, and pictures drawn by the site's own copy of plotly.js."""
+    """The notebook as part of a page: code, printed output, and figures drawn by the site's own copy of plotly.js."""
     return "\n".join(_parts(notebook, name))
 
 

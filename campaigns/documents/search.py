@@ -14,7 +14,7 @@ def document() -> str:
 
 
 def with_table(page: str) -> str:
-    """A page with the table of today in the place of the old one."""
+    """A page with its table replaced by the current one."""
     before, _, rest = page.partition(BEGIN)
     return before + document() + rest.partition(END)[2]
 

@@ -1,6 +1,6 @@
-"""python -m campaigns.faults [GROUP ...] [--short] [-o FILE]: attack everything, and write docs/faults.md; exit code 1 if a row is a hole.
+"""python -m campaigns.faults [GROUP ...] [--short] [-o FILE]: run all attacks, and write docs/faults.md; exit code 1 if one finds a fault.
 
-Without a name all groups; soak has its own options: python -m campaigns.faults soak --help.
+Without a name, all groups; soak has its own options: python -m campaigns.faults soak --help.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
 
 
 def main() -> int:
-    """Run what was asked for; the page is written after every attack."""
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background: commands under attack would be deaf for Ctrl-C
+    """Run the requested groups; the page is written after every attack."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # started in the background: the attacked commands would ignore Ctrl-C
         signal.signal(signal.SIGINT, signal.default_int_handler)
     for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(threads, "1")

@@ -1,4 +1,4 @@
-"""One attack, and what came of it: whole, part and said, one line, or zero volts within a bound; everything else is a hole."""
+"""One attack and its outcome: full, part-and-said, one line, or zero volts within a bound (docs/faults.md); any other outcome is a fault."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from typing import Literal
 Outcome = Literal["full", "part-and-said", "one line", "zero volts", "no sum", "silent", "traceback", "too late", "stump", "not told", "skipped"]
 GOOD: tuple[Outcome, ...] = ("full", "part-and-said", "one line", "zero volts", "no sum")
 """full: everything is right. no sum: a number changed in a format that has no check sum for it, which docs/files.md says."""
-LONGEST = 60.0  # s for one try of a reader or a command in this process
-ONE_LINE = 1000  # characters
+LONGEST = 60.0  # s, limit for one try of a reader or a command in this process
+ONE_LINE = 1000  # most characters of an error message
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What came of one try. seconds: how long it took, or until zero volts; travel: m until rest; note: how to do a bad one again, or figures."""
+    """Outcome of one try. seconds: duration, or time until zero volts; travel: m until rest; note: how to repeat a failed try, or figures."""
 
     outcome: Outcome
     seconds: float = 0.0
@@ -35,7 +35,7 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Attack:
-    """One row of the table. tries: of a whole campaign; short: of the one in the tests; bound: what is promised, in words."""
+    """One row of the table. tries: in the full campaign; short: in that of the tests; bound: the promised bound, in words."""
 
     name: str
     run: Callable[[int, Path], Iterable[Found]]
@@ -46,7 +46,7 @@ class Attack:
 
 @dataclass(slots=True)
 class Row:
-    """What came of all tries of an attack."""
+    """Outcomes of all tries of an attack."""
 
     name: str
     bound: str = ""
@@ -57,7 +57,7 @@ class Row:
     bad: list[str] = field(default_factory=list)
 
     def add(self, found: Found) -> None:
-        """One more try."""
+        """Add one try."""
         self.counts[found.outcome] += 1
         self.seconds, self.travel = max(self.seconds, found.seconds), max(self.travel, found.travel)
         if found.outcome not in (*GOOD, "skipped"):
@@ -67,7 +67,7 @@ class Row:
 
     @property
     def holds(self) -> bool:
-        """Nothing silent, no traceback, nothing too late; and something was tried or skipped with a reason."""
+        """True if every outcome is acceptable, and at least one try was made, or skipped with a reason."""
         return not self.bad and sum(self.counts.values()) > 0
 
 
@@ -78,7 +78,7 @@ def attacked(attack: Attack, folder: Path, short: bool) -> Row:
     try:
         for found in attack.run(attack.short if short else attack.tries, folder):
             row.add(found)
-    except Exception as error:  # noqa: BLE001  a hole, or a fault of the attack itself: either ends this row, and no other
+    except Exception as error:  # noqa: BLE001  a fault found, or one of the attack itself: either ends this row only
         place = traceback.extract_tb(error.__traceback__)[-1]
         text = f"{type(error).__name__}: {' '.join(str(error).split())[:200]} ({Path(place.filename).name}:{place.lineno})"
         row.add(Found("traceback", note=f"the attack itself: {text}"))
@@ -87,7 +87,7 @@ def attacked(attack: Attack, folder: Path, short: bool) -> Row:
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """Raises TimeoutError in the middle of what takes longer (main thread only)."""
+    """Context that raises TimeoutError in code that takes longer (main thread only)."""
 
     def late(number: int, frame: FrameType | None) -> None:
         raise TimeoutError(f"longer than {seconds:g} s")
@@ -102,13 +102,13 @@ def at_most(seconds: float) -> Iterator[None]:
 
 
 def judged(work: Callable[[], Found], what: str, seconds: float = LONGEST) -> Found:
-    """What the work finds; an error of the project is one line, any other a hole."""
+    """The outcome of the work; an error class of the project counts as one line, any other error as a fault."""
     from xy_sysid.errors import XySysidError
 
     begun = time.monotonic()
     try:
         with at_most(seconds), warnings.catch_warnings():
-            warnings.simplefilter("error", RuntimeWarning)  # numbers that nobody meant to make
+            warnings.simplefilter("error", RuntimeWarning)  # unintended overflow or NaN
             found = work()
     except XySysidError as error:
         text = str(error)
@@ -116,7 +116,7 @@ def judged(work: Callable[[], Found], what: str, seconds: float = LONGEST) -> Fo
         found = Found("one line" if good else "not told", note="" if good else f"{what}: {text[:200]!r}")
     except TimeoutError as late:
         found = Found("too late", note=f"{what}: {late}")
-    except (Exception, RecursionError) as error:  # noqa: BLE001  whatever it is, it is what is looked for
+    except (Exception, RecursionError) as error:  # noqa: BLE001  any error is a result of the campaign
         place = traceback.extract_tb(error.__traceback__)[-1]
         found = Found("traceback", note=f"{what}: {type(error).__name__}: {str(error)[:120]} ({Path(place.filename).name}:{place.lineno})")
     return Found(found.outcome, found.seconds or time.monotonic() - begun, found.travel, found.note)
@@ -124,7 +124,7 @@ def judged(work: Callable[[], Found], what: str, seconds: float = LONGEST) -> Fo
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What a command said in this process."""
+    """Exit code and output of a command in this process."""
 
     code: int
     out: str
@@ -132,7 +132,7 @@ class Said:
 
 
 def command(*words: object) -> Said:
-    """Run one in this process."""
+    """Run a command in this process."""
     from xy_sysid.cli import run
 
     out, err = io.StringIO(), io.StringIO()
@@ -142,7 +142,7 @@ def command(*words: object) -> Said:
 
 
 def answered(said: Said, what: str) -> Found:
-    """A command that gives an answer, or refuses in one line."""
+    """The outcome of a command that must give an answer, or an error message in one line."""
     if "Traceback" in said.err or said.code not in (0, 1, 2):
         return Found("traceback", note=f"{what}: code {said.code}, {said.err[-200:]!r}")
     if said.code == 2:
@@ -153,7 +153,7 @@ def answered(said: Said, what: str) -> Found:
 
 
 def environment(**changes: str) -> dict[str, str]:
-    """For processes: nothing that changes how Python behaves, and the project on the path."""
+    """Environment for processes: no variables that change Python's behaviour, and the project on the path."""
     root = str(Path(__file__).parents[2])
     kept = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     return {**kept, "PYTHONPATH": root, **changes}

@@ -1,4 +1,4 @@
-"""An axis that is wired backwards, at every voltage: how long until zero volts, and how far it goes until it rests.
+"""An axis with reversed wiring, at several voltages: time until zero volts, and travel until rest.
 
 ``python -m campaigns.faults.backwards`` prints the table of docs/real-machine-safely.md.
 """
@@ -20,18 +20,18 @@ LONGEST = 30.0  # s
 
 
 def backwards(rms: float, seed: int) -> Outcome:
-    """The simulated table with the sign of both encoders wrong from the start, and default settings but for rms."""
+    """The simulated table with a wrong sign of both encoders from the start, and default settings except rms."""
     return run(Machine.from_file("rigid.yaml", seed), Drive(settings({"rms": rms, "seed": seed})), LONGEST, scaled(-1.0))
 
 
 def worst(rms: float, seeds: Iterable[int]) -> tuple[bool, float, float]:
-    """Whether all were stopped by a guard, and the longest time, s, and way, m."""
+    """True if a guard stopped all, longest time, s, and largest travel, m."""
     found = [backwards(rms, seed) for seed in seeds]
     return all(one.fault for one in found), max(one.seconds for one in found), max(one.place for one in found)
 
 
 def main() -> int:
-    """Print the table; 1 if one was not stopped within a tenth of its travel."""
+    """Print the table; returns 1 if one was not stopped within a tenth of its travel."""
     good = True
     for rms in LEVELS:
         stopped, seconds, way = worst(rms, range(1, SEEDS + 1))

@@ -1,6 +1,6 @@
 """Two hosts as network namespaces, and a cable between them that loses packets, is pulled, and comes back: no kernel module is needed.
 
-Each host has a TAP device; one process copies Ethernet frames from one to the other, and leaves out some by a seed. Only root may do this.
+Each host has a TAP device; one process copies Ethernet frames from one to the other, and drops some by a seed. This needs root.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ MACHINE, DESK = "10.77.0.1", "10.77.0.2"
 
 @dataclass(frozen=True, slots=True)
 class Hosts:
-    """Names of the namespaces, and where orders to the cable go."""
+    """Names of the namespaces, and the address for orders to the cable."""
 
     machine: str
     desk: str
     orders: str
 
     def order(self, **values: float) -> None:
-        """loss: part of the frames that are lost, either way; 1 is a pulled cable. delay is not offered."""
+        """loss: fraction of lost frames, in each direction; 1 is a pulled cable. There is no delay."""
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
             line.sendto(json.dumps(values).encode(), self.orders)
 
 
 def why_not() -> str:
-    """Why no such hosts can be made here; empty if they can."""
+    """Why such hosts cannot be made here; empty if they can."""
     if sys.platform != "linux" or os.geteuid() != 0:
         return "network namespaces need Linux and root"
     if not Path("/dev/net/tun").exists():
@@ -59,7 +59,7 @@ def why_not() -> str:
 
 @contextmanager
 def hosts(folder: Path) -> Iterator[Hosts]:
-    """The machine's host and the desk, with a cable that loses nothing; gone at the end."""
+    """The machine's host and the desk, with a cable without loss; removed at the end."""
     names = [f"xyf{os.getpid()}{place}" for place in ("m", "d")]
     orders = str(folder / "cable")
     cable: subprocess.Popen[str] | None = None
@@ -88,7 +88,7 @@ def _run(*words: str) -> None:
 
 
 def _tap(space: str) -> int:
-    """A TAP device called eth0 in a namespace, as a file that this process reads and writes."""
+    """A TAP device named eth0 in a namespace, as a file descriptor of this process."""
     libc = ctypes.CDLL(None, use_errno=True)
     here = os.open("/proc/self/ns/net", os.O_RDONLY)
     there = os.open(f"/var/run/netns/{space}", os.O_RDONLY)
@@ -119,7 +119,7 @@ def main(orders: str, *spaces: str) -> None:
                     continue
                 frame = os.read(ready, LONGEST)
                 if chance.random() >= loss:
-                    with suppress(OSError):  # the other end is not up yet
+                    with suppress(OSError):  # the other device is not up yet
                         os.write(ends[1 - ends.index(ready)], frame)
 
 

@@ -1,4 +1,4 @@
-"""Recordings and models with changed, cut, repeated and swapped bytes: what is read is right, or it is said, or it is refused."""
+"""Recordings and models with changed, cut, repeated and swapped bytes: the result is right, or a note reports the damage, or an error."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Damage = Callable[[bytes, np.random.Generator], bytes]
 
 
 def truth(rows: int = ROWS) -> Recording:
-    """Two axes at 2 kHz; every number is another."""
+    """Two axes at 2 kHz; all numbers are different."""
     random = np.random.default_rng(7)
     seq = np.arange(rows)
     return Recording(
@@ -80,7 +80,7 @@ DAMAGES: tuple[Damage, ...] = (_stretch, _bit, _bit, _cut, _zeros, _twice, _gone
 
 
 def compared(found: Recording, true: Recording, summed: bool) -> Found:
-    """Whether what was read is what was recorded."""
+    """Comparison of a read recording with the true one."""
     if not len(found) or not set(found.axes) <= set(true.axes):
         return Found("silent" if summed and not found.notes else "no sum" if not found.notes else "part-and-said")
     columns = [true.axes.index(axis) for axis in found.axes]
@@ -111,7 +111,7 @@ def damaged(whole: bytes, number: int, seed: int) -> bytes:
 
 
 def in_file(made: Callable[[Path], tuple[Path, Path]], summed: bool, seed: int) -> Callable[[int, Path], Iterator[Found]]:
-    """Tries on one file of a recording. made: writes it into a folder and gives (what to load, the file to damage)."""
+    """Tries on one file of a recording. made: writes it to a folder and returns (path to load, file to damage)."""
 
     def run(tries: int, folder: Path) -> Iterator[Found]:
         place, file = made(folder)
@@ -151,7 +151,7 @@ def _write(writer: BagWriter) -> None:
 
 
 def _without_sums(path: Path) -> None:
-    """As another recorder writes it."""
+    """Remove the checksums, as in a bag of another recorder."""
     told = json.loads((path / "metadata.yaml").read_text("utf-8"))
     told["rosbag2_bagfile_information"]["custom_data"] = None
     (path / "metadata.yaml").write_text(json.dumps(told), "utf-8")
@@ -180,7 +180,7 @@ def _metadata(folder: Path) -> tuple[Path, Path]:
 
 
 def models(tries: int, folder: Path) -> Iterator[Found]:
-    """A saved model with changed bytes: refused, or what was saved."""
+    """A saved model with changed bytes: an error, or the saved model."""
     from xy_sysid.files.models import load_model
     from xy_sysid.files.seal import sealed
 
@@ -221,7 +221,7 @@ def rigid(path: Path, rows: int = 12_000) -> Path:
 
 
 def states(tries: int, folder: Path) -> Iterator[Found]:
-    """The identifier's saved memory: refused, or what was saved."""
+    """The identifier's saved state with changed bytes: an error, or the saved state."""
     from xy_sysid.files.state import load_state, save_state
 
     path = folder / "state.npz"

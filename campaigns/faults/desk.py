@@ -1,7 +1,7 @@
-"""One scenario on two hosts, run on the desk: python -m campaigns.faults.desk SCENARIO; tells what it measured as one line of JSON.
+"""One scenario on two hosts, run on the desk: python -m campaigns.faults.desk SCENARIO; prints its results as one line of JSON.
 
-The machine's host has the drive (the simulated table, moving on in real time, with a watchdog of 50 ms) and the excitation; the desk has the
-identifier, and in some scenarios the excitation (whose own watchdog is 0.5 s here, so that a busy computer is not taken for a cable).
+The machine's host has the drive (the simulated table in real time, with a watchdog of 50 ms) and the excitation; the desk has the
+identifier, and in some scenarios the excitation (with a watchdog of 0.5 s, so that a busy computer does not look like a pulled cable).
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "excitation": {"x.rms": 1.0, "y.rms": 1.0, "watchdog": 0.5},
     "identifier": {"length": LENGTH, "numerator_order": 0, "denominator_order": 2, "refit": 2.0, "band_low": 4.0, "save_every": 1.0},
 }
-READY = 60.0  # s
+READY = 60.0  # s, timeout
 
 
 class Desk:
-    """Starts nodes on either host, listens on this one."""
+    """Starts nodes on either host, and receives messages on this one."""
 
     def __init__(self, hosts: Hosts, folder: Path, remote_drive: bool = False) -> None:
         self.hosts, self.folder, self.remote = hosts, folder, remote_drive
@@ -42,7 +42,7 @@ class Desk:
         self.begun = time.monotonic()
 
     def start(self, name: str) -> None:
-        """On its host."""
+        """Start a node on its host."""
         parameters = dict(PARAMETERS[name])
         if name == "identifier":
             parameters["state_file"] = str(self.folder / "state.npz")
@@ -54,7 +54,7 @@ class Desk:
             self.processes[name] = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
 
     def kill(self, name: str) -> None:
-        """kill -9; ip has become the node."""
+        """kill -9 of a node; the process of ip has become the node."""
         self.processes[name].send_signal(signal.SIGKILL)
         self.processes[name].wait()
         if name == "identifier":
@@ -62,7 +62,7 @@ class Desk:
         self.monitor.statuses.pop(name, None)
 
     def end(self) -> None:
-        """Everybody leaves."""
+        """End all nodes."""
         for process in self.processes.values():
             process.send_signal(signal.SIGINT)
         for process in self.processes.values():
@@ -73,11 +73,11 @@ class Desk:
         self.monitor.close()
 
     def said(self, name: str) -> str:
-        """All that a node wrote."""
+        """The output of a node."""
         return (self.folder / f"{name}.log").read_text("utf-8", "replace")
 
     def until(self, done: Callable[[], bool], seconds: float) -> float:
-        """Listen until it is done; how long that took, or NaN."""
+        """Receive messages until ``done``; returns the time, s, or NaN after ``seconds``."""
         begun = time.monotonic()
         while time.monotonic() - begun < seconds:
             if done():
@@ -86,15 +86,15 @@ class Desk:
         return float("nan")
 
     def value(self, status: str, key: str) -> float:
-        """A number that a node says of itself; 0 until it does."""
+        """A number from the status of a node; 0 before the first status."""
         return float(self.monitor.statuses.get(status, (0, "", {}))[2].get(key, "0"))
 
     def active(self) -> bool:
-        """Whether the excitation says that it drives."""
+        """True if the excitation reports that it drives."""
         return str(self.monitor.statuses.get("excitation", (0, "", {}))[2].get("state", "")) == "active"
 
     def drive(self, seconds: float = READY) -> bool:
-        """Configure and activate, once everybody hears everybody."""
+        """Configure and activate the excitation once all nodes are connected; True if it drives."""
         from lifecycle_msgs.msg import Transition
 
         if not self.monitor._wanted:
@@ -114,7 +114,7 @@ class Desk:
         return self.active()
 
     def response(self) -> dict[str, list[float]]:
-        """Of x: frequency, real, imag, sigma."""
+        """The response of axis x: frequency, real, imag, sigma."""
         message = self.monitor.arrays.get("frf/x")
         if message is None:
             return {}
@@ -123,7 +123,7 @@ class Desk:
         return {name: table[rows, place].tolist() for place, name in ((0, "frequency"), (1, "real"), (2, "imag"), (4, "sigma"))}
 
     def facts(self) -> dict[str, Any]:
-        """What the nodes count."""
+        """The counters of the nodes."""
         streams = self.monitor.statuses.get("streams", (0, "", {}))
         axis = self.monitor.statuses.get("axis x", (0, "", {}))
         return {
@@ -140,7 +140,7 @@ class Desk:
 
 
 def loss(desk: Desk, part: float, seconds: float) -> dict[str, Any]:
-    """Everything at once, with so much loss from the start."""
+    """All nodes start at once, with the loss ``part`` from the start."""
     desk.hosts.order(loss=part)
     for name in ("ballscrew", "identifier", "excitation"):
         desk.start(name)
@@ -158,7 +158,7 @@ def loss(desk: Desk, part: float, seconds: float) -> dict[str, Any]:
 
 
 def pulled(desk: Desk, away: float, seconds: float) -> dict[str, Any]:
-    """The cable is pulled while all is well, and comes back."""
+    """The cable is pulled during normal operation, and reconnected."""
     loss(desk, 0.0, 6.0)
     before = desk.facts()
     desk.hosts.order(loss=1.0)
@@ -168,7 +168,7 @@ def pulled(desk: Desk, away: float, seconds: float) -> dict[str, Any]:
     paired = silent["paired"]
     back = desk.until(lambda: desk.value("streams", "samples paired") > paired, READY)
     again = True
-    if desk.remote:  # without positions the drive has ended, as it must
+    if desk.remote:  # without positions the drive must have ended
         stopped = "no position from the machine" in desk.said("excitation") or not desk.active()
         again = desk.drive()
         back = desk.until(lambda: desk.value("streams", "samples paired") > paired, READY)
@@ -185,7 +185,7 @@ def late(desk: Desk, seconds: float) -> dict[str, Any]:
     """The identifier joins 5 s after the machine began to move."""
     desk.start("ballscrew")
     desk.start("excitation")
-    desk.monitor.statuses["streams"] = (0, "", {})  # nobody to wait for
+    desk.monitor.statuses["streams"] = (0, "", {})  # there is no identifier to wait for
     driven = desk.drive()
     desk.monitor.spin(5.0)
     desk.start("identifier")
@@ -199,7 +199,7 @@ def _more_paired(desk: Desk, than: float) -> bool:
 
 
 def restarts(desk: Desk, order: list[str], seconds: float) -> dict[str, Any]:
-    """kill -9 of each node in this order, each started again when its end has been seen; then identification must go on."""
+    """kill -9 of each node in this order, each restarted after its end was noticed; then identification must continue."""
     loss(desk, 0.0, 5.0)
     waits = {}
     for name in order:
@@ -218,7 +218,7 @@ def restarts(desk: Desk, order: list[str], seconds: float) -> dict[str, Any]:
 
 
 def clocks(desk: Desk, seconds: float) -> dict[str, Any]:
-    """A source on the machine's host whose clock jumps by an hour forth, a day back and 50 ms, and whose rate then changes."""
+    """A source on the machine's host whose clock jumps forward by an hour, back by a day and by 50 ms, and whose rate then changes."""
     desk.start("identifier")
     place = ["ip", "netns", "exec", desk.hosts.machine]
     with (desk.folder / "source.log").open("ab") as log:
@@ -232,7 +232,7 @@ def clocks(desk: Desk, seconds: float) -> dict[str, Any]:
 
 
 def main(asked: dict[str, Any]) -> dict[str, Any]:
-    """Run what is asked for."""
+    """Run the requested scenario; returns its results."""
     hosts = Hosts(**asked["hosts"])
     folder = Path(asked["folder"])
     desk = Desk(hosts, folder, bool(asked.get("remote")))
@@ -244,7 +244,7 @@ def main(asked: dict[str, Any]) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """As JSON has it: no NaN."""
+    """The value in JSON types: NaN becomes null."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""Every writer on a disk that becomes full at any moment: the old file is whole, or nothing is there, and one line names the file."""
+"""Every writer on a disk that becomes full at any moment: the old file is unchanged, or there is no file, and one line names the file."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ FRESH: dict[str, tuple[str, ...]] = {
 
 @contextmanager
 def full_disk(room: int) -> Iterator[None]:
-    """No file can grow beyond so many bytes."""
+    """Context in which no file can grow beyond ``room`` bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
     try:
@@ -67,13 +67,13 @@ def _largest(path: Path) -> int:
 
 
 def on_a_file(name: str) -> Callable[[int, Path], Iterator[Found]]:
-    """A command that writes over a file."""
+    """Tries of a command that replaces a file."""
 
     def tries(count: int, folder: Path) -> Iterator[Found]:
         rigid(folder / "rec.npz")
         out = folder / "out" / "made"
         out.parent.mkdir()
-        said = command(*_words(COMMANDS[name], folder, out))  # once with room, so that nothing has to be compiled on the full disk
+        said = command(*_words(COMMANDS[name], folder, out))  # once with enough room, so that nothing is compiled on the full disk
         assert said.code == 0, said.err
         most = out.stat().st_size
         for number in range(count):
@@ -96,7 +96,7 @@ def _judged(said: Said, out: Path, left: list[Path], what: str) -> Found:
 
 
 def on_nothing(name: str) -> Callable[[int, Path], Iterator[Found]]:
-    """A command that makes something new."""
+    """Tries of a command that makes a new file."""
 
     def tries(count: int, folder: Path) -> Iterator[Found]:
         save(truth(8000), folder / "bag")
@@ -126,7 +126,7 @@ def _gone(path: Path) -> None:
 
 
 def library(tries: int, folder: Path) -> Iterator[Found]:
-    """save of recordings, models and the identifier's state, called from Python."""
+    """``save`` of recordings, models and the identifier's state, called from Python."""
     from xy_sysid.files.state import save_state
 
     state = {"a": np.random.default_rng(3).normal(size=2000)}
@@ -152,7 +152,7 @@ def library(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def real_disk(tries: int, folder: Path) -> Iterator[Found]:
-    """A tmpfs of 200 kB with some of it taken: simulate and fit write there until it is full."""
+    """A partly used tmpfs of 200 kB: simulate and fit write there until it is full."""
     place = folder / "small"
     place.mkdir()
     mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", str(place)], capture_output=True, text=True, check=False)
@@ -177,7 +177,7 @@ def real_disk(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def full_stdout(tries: int, folder: Path) -> Iterator[Found]:
-    """What is said cannot be written: code 2, and one line on stderr if that can, after the notes on the recording."""
+    """Standard output is full: exit code 2, and one line on stderr if possible, after the notes on the recording."""
     rigid(folder / "rec.npz")
     rec = str(folder / "rec.npz")
     for words in (("frf", rec), ("fit", rec, *RIGID, "--json"), ("effects", "--json"), ("columns", rec), ("--help",))[:tries]:
@@ -195,7 +195,7 @@ def _has_what_was_flushed(path: Path, flushed: int) -> Found:
 
 
 def recorder(tries: int, folder: Path) -> Iterator[Found]:
-    """The recorder's bag while the disk fills up: what was flushed before is a whole bag."""
+    """The recorder's bag while the disk becomes full: all flushed data are a complete bag."""
     from xy_sysid.bags import BagWriter
     from xy_sysid.imports import blocks
 

@@ -1,4 +1,4 @@
-"""Attacks on the page's server: bodies of any size, headers, WebSockets of strangers and of those who say nonsense; it lives on, small and quick."""
+"""Attacks on the page's server: large bodies, wrong headers, WebSockets from other origins or with nonsense; it must stay small and fast."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WORDS = (
     "`xy-sysid page` on a recording, attacked through its port. After each try it must answer within 2 s, its memory must not have grown by more "
     "than 100 MB, and it must not have printed a traceback. Documents of the topic `story` are given to the page's own reader."
 )
-MORE, ANSWERS = 100.0, 2.0  # MB, s
+MORE, ANSWERS = 100.0, 2.0  # MB, allowed growth; s, limit for an answer
 BIG = 40_000_000  # bytes of a body
 
 
@@ -39,11 +39,11 @@ class Server:
     before: float = 0.0
 
     def said(self) -> str:
-        """All it wrote on stderr."""
+        """Its output on stderr."""
         return self.log.read_text("utf-8", "replace")
 
     def alive(self) -> float:
-        """Seconds until it answers."""
+        """Time of a health check, s."""
         begun = time.monotonic()
         with urllib.request.urlopen(f"http://127.0.0.1:{self.port}/alive", timeout=10.0) as answer:
             json.load(answer)
@@ -52,7 +52,7 @@ class Server:
 
 @contextmanager
 def server(folder: Path) -> Iterator[Server]:
-    """On a rigid recording, without a machine."""
+    """A server with a recording of a rigid axis, without a machine."""
     rec = rigid(folder / "rec.npz", 6000)
     words = [sys.executable, "-m", "xy_sysid", "page", str(rec), "--port", "0", "--no-browse", "--folder", str(folder)]
     with (folder / "page.log").open("wb") as log:
@@ -76,13 +76,13 @@ def server(folder: Path) -> Iterator[Server]:
 
 
 def request(method: str, path: str, headers: dict[str, str] | None = None) -> bytes:
-    """The head of a request from the page itself."""
+    """The head of a request as the page sends it."""
     lines = {"Host": "127.0.0.1", "X-Requested-With": "xy_sysid", **(headers or {})}
     return f"{method} {path} HTTP/1.1\r\n{''.join(f'{name}: {value}' + chr(13) + chr(10) for name, value in lines.items())}\r\n".encode("latin-1")
 
 
 def send(port: int, data: bytes, body: int = 0, wait: float = 2.0, chunked: bool = False) -> bytes:
-    """Say so, then so many bytes of a body as long as they are taken; what was answered."""
+    """Send data, then ``body`` bytes while they are accepted; returns the answer."""
     with socket.create_connection(("127.0.0.1", port), timeout=5.0) as line:
         line.settimeout(wait)
         with suppress(OSError):
@@ -159,7 +159,7 @@ def _noise(port: int, random: np.random.Generator) -> None:
 
 
 def upgrade(port: int, origin: str = "") -> socket.socket:
-    """A WebSocket of the page, as a browser opens it; the caller closes it."""
+    """Open a WebSocket of the page like a browser; the caller closes it."""
     key = base64.b64encode(os.urandom(16)).decode()
     headers = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Key": key, "Sec-WebSocket-Version": "13"}
     line = socket.create_connection(("127.0.0.1", port), timeout=5.0)
@@ -196,7 +196,7 @@ def _sockets(port: int, random: np.random.Generator) -> None:
 
 
 def _lie_in_wait(port: int, random: np.random.Generator) -> None:
-    """Forty connections that begin to ask and say no more."""
+    """Forty connections that send an incomplete request."""
     lines = [socket.create_connection(("127.0.0.1", port), timeout=5.0) for _ in range(40)]
     for line in lines:
         line.sendall(b"POST /stop HTTP/1.1\r\nHost: 127")
@@ -208,7 +208,7 @@ def _lie_in_wait(port: int, random: np.random.Generator) -> None:
 
 
 def attacking(attack: Callable[[int, np.random.Generator], None], seed: int) -> Callable[[int, Path], Iterator[Found]]:
-    """Tries on one server."""
+    """Tries of one attack on a server."""
 
     def tries(count: int, folder: Path) -> Iterator[Found]:
         with server(folder) as made:
@@ -229,7 +229,7 @@ def attacking(attack: Callable[[int, np.random.Generator], None], seed: int) -> 
 
 
 def stories(tries: int, folder: Path) -> Iterator[Found]:
-    """Texts of the topic story/x: brackets, numbers, names and nonsense."""
+    """Wrong texts of the topic story/x: brackets, numbers, names and nonsense."""
     from xy_sysid.page.topics_state import TopicsState
 
     made = (

@@ -1,4 +1,4 @@
-"""An encoder that fails while noise, a constant voltage or a sweep drives: zero volts and rest within what docs/real-machine-safely.md promises."""
+"""An encoder that fails during noise, a constant voltage or a sweep: zero volts and rest within the bounds of docs/real-machine-safely.md."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ STOP = 0.15  # m, the end stop of the simulated table
 
 
 def promised() -> dict[str, tuple[float, float]]:
-    """Of the table in the docs: s until zero volts and m until rest, by fault."""
+    """Bounds from the table in the docs: s until zero volts and m until rest, by fault."""
     rows = re.findall(r"^\| ([\w ]+) \| ([\d.]+) ms \| ([\d.]+) mm \|", DOC.read_text(encoding="utf-8"), re.MULTILINE)
     return {name: (float(time) / 1000, float(way) / 1000) for name, time, way in rows}
 
 
 def while_driven(name: str) -> Callable[[int, Path], Iterator[Found]]:
-    """Tries with one fault, each with another noise and another moment."""
+    """Tries with one fault, each with other noise and at another time."""
 
     def tries(count: int, folder: Path) -> Iterator[Found]:
         seconds, way = promised()[name]
@@ -45,7 +45,7 @@ def while_driven(name: str) -> Callable[[int, Path], Iterator[Found]]:
 
 
 def from_the_start(name: str) -> Callable[[int, Path], Iterator[Found]]:
-    """The fault is there before anything moved: rest before the end stop is what is asked."""
+    """Tries with a fault from the start: the axis must come to rest before the end stop."""
 
     def tries(count: int, folder: Path) -> Iterator[Found]:
         for number in range(count):

@@ -1,4 +1,4 @@
-"""A machine that is driven while its encoder fails: how long until zero volts, and how far it goes until it rests."""
+"""A driven machine whose encoder fails: time until zero volts, and travel until rest."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ N, RATE = 20, 2000.0
 
 
 def frozen(block: Block, good: Block) -> Block:
-    """The counter goes on, the position does not."""
+    """A position that stays constant while the counter continues."""
     return replace(block, values=np.tile(good.values[-1], (len(block), 1)))
 
 
 def moved(metres: float) -> Callable[[Block, Block], Block]:
-    """From now on so far away."""
+    """A position that jumps by ``metres``."""
     return lambda block, good: replace(block, values=block.values + metres)
 
 
 def scaled(factor: float, about_here: bool = False) -> Callable[[Block, Block], Block]:
-    """From now on in another unit, or counted from here with another step."""
+    """A position in another unit, or with another step size from the present position on."""
 
     def fault(block: Block, good: Block) -> Block:
         here = good.values[-1] if about_here else 0.0
@@ -55,7 +55,7 @@ FROM_THE_START = ("frozen while driven", "reversed sign", "1000 times too large"
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """reason: the drive's; seconds: from the fault to zero volts; travel: m, the furthest from where it was; place: m, furthest from 0."""
+    """reason: of the drive; seconds: from the fault to zero volts; travel: m, largest distance from the fault's position; place: m, from 0."""
 
     reason: str
     fault: bool
@@ -65,12 +65,12 @@ class Outcome:
 
 
 def settings(axis: dict[str, Any], axes: tuple[str, ...] = ("x", "y"), **more: Any) -> ExcitationSettings:
-    """The same for every axis."""
+    """Settings with equal values for every axis, and a different seed for each."""
     return ExcitationSettings(axes={name: AxisExcitation(**{"seed": k, **axis}) for k, name in enumerate(axes, start=1)}, **more)
 
 
 def run(machine: Machine, drive: Drive, seconds: float, fault: Callable[[Block, Block], Block | None] | None = None, at: float = 0.0) -> Outcome:
-    """Drive in real time (told); from ``at`` on the encoder has the fault. The machine coasts at zero volts afterwards."""
+    """Drive with a simulated clock; from ``at`` s on the encoder has the fault. Afterwards the machine coasts at zero volts."""
     drive.start()
     answer: Block | None = None
     good: Block | None = None

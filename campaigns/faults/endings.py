@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and kill -9 at any moment of every long command: the exit code says which, and no partial file is left."""
+"""Ctrl-C, SIGTERM and kill -9 at any moment of every long command: the exit code names the signal, and no partial file remains."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ COMMANDS: dict[str, tuple[tuple[str, ...], float]] = {
     "record": (("record", "OUT"), 4.0),
     "run": (("run", "--params", "demo.yaml"), 5.0),
 }
-SLOWEST = 20.0  # s from the signal to the end
+SLOWEST = 20.0  # s, limit from the signal to the end
 
 
 def ended(name: str) -> Callable[[int, Path], Iterator[Found]]:
@@ -81,12 +81,12 @@ def _try(command: list[str], out: Path, number: signal.Signals, after: float) ->
             return Found("too late", note=f"{command[3:]}, {number.name} after {after:.3f} s: it does not end")
     seconds, said = time.monotonic() - begun, (out.parent / "said").read_text("utf-8", "replace")
     what = f"{command[3:]}, {number.name} after {after:.3f} s: code {code}, {said[-300:]!r}"
-    if "Traceback" in said and code != -number:  # before Python is up, nobody can catch anything
+    if "Traceback" in said and code != -number:  # before Python has started, no handler exists
         return Found("traceback", note=what)
     left = sorted(item.name for item in out.iterdir())
     asked = {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
     if code in (asked, -number):
-        kept = command[3] == "record"  # what was recorded is kept, on purpose
+        kept = command[3] == "record"  # its recording is kept on purpose
         return Found("full", seconds) if not left or (kept and left == ["made"]) else Found("stump", note=f"{what}: {left}")
     if code in (0, 1):
         return Found("full", seconds)
@@ -94,7 +94,7 @@ def _try(command: list[str], out: Path, number: signal.Signals, after: float) ->
 
 
 def killed_recorder(tries: int, folder: Path) -> Iterator[Found]:
-    """kill -9 of what writes a bag at full speed: what it had said to be flushed is there, and the bag is whole."""
+    """kill -9 of a process that writes a bag at full speed: all data that it reported as flushed are there, and the bag is complete."""
     program = (
         "import sys, time\n"
         "from campaigns.faults.damage import truth\n"

@@ -1,4 +1,4 @@
-"""What is attacked: modules of attacks, and what each is called."""
+"""The groups of attacks: modules, and their titles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files made to harm, and recordings in which single messages are wrong: refused at once in one line, or the rest is read and paired rightly."""
+"""Malicious files, and recordings with single wrong messages: an error in one line at once, or the rest is read and paired correctly."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ WORDS = (
     "Decompression bombs (declared and hidden sizes, with 40 MB of memory), every field of metadata.yaml with unusual values, pipes, and "
     "recordings with single wrong messages, counters or clocks. Voltage and position of a row must belong to the same sample."
 )
-QUICK = 2.0  # s, for a refusal
+QUICK = 2.0  # s, limit for an error
 Messages = list[tuple[str, Block]]
 
 
 @contextmanager
 def small_memory() -> Iterator[None]:
-    """A machine on which 40 MB may be loaded at once."""
+    """Context in which at most 40 MB may be loaded."""
     before, memory = limits.SHARE, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     limits.SHARE = limits.COPIES * 40e6 / memory
     try:
@@ -55,7 +55,7 @@ def _mat(path: Path) -> Path:
 
 
 def _lying_npz(path: Path) -> Path:
-    """A header of 10^12 numbers, and a directory that says the file is small."""
+    """A header of 10^12 numbers, and a directory with a small file size."""
     np.save(path.with_suffix(".npy"), np.zeros(3000))
     honest = path.with_suffix(".npy").read_bytes()
     with zipfile.ZipFile(path.with_suffix(".npz"), "w") as archive:
@@ -66,7 +66,7 @@ def _lying_npz(path: Path) -> Path:
 
 
 def _lying_zip(path: Path) -> Path:
-    """The directory says 3 kB, the stream becomes 400 MB."""
+    """The directory gives 3 kB, the stream decompresses to 400 MB."""
     made = _npz(path)
     data = bytearray(made.read_bytes())
     at = data.rfind(b"other.npy") - 46
@@ -114,7 +114,7 @@ BOMBS: tuple[Callable[[Path], Path], ...] = (_npz, _mat, _lying_npz, _lying_zip,
 
 
 def bombs(tries: int, folder: Path) -> Iterator[Found]:
-    """Each file that swells."""
+    """Files with a much larger decompressed size."""
     for number, made in enumerate(BOMBS[:tries]):
         path = made(folder / f"bomb{number}")
 
@@ -144,7 +144,7 @@ ODD = (
 
 
 def metadata(tries: int, folder: Path) -> Iterator[Found]:
-    """Every field of metadata.yaml, and every odd value: the files beside it are read as they are."""
+    """Wrong values of every field of metadata.yaml: the files next to it are read unchanged."""
     bag = folder / "bag"
     save(truth(400), bag)
     told = json.loads((bag / "metadata.yaml").read_text("utf-8"))["rosbag2_bagfile_information"]
@@ -161,7 +161,7 @@ def metadata(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def pipes(tries: int, folder: Path) -> Iterator[Found]:
-    """What never ends, in the place of each kind of file."""
+    """A pipe or device instead of each kind of file."""
     for name in ("a.csv", "a.npz", "a.mat", "a.db3", "a.mcap", "a.txt")[:tries]:
         os.mkfifo(folder / name)
 
@@ -229,7 +229,7 @@ def _as_written(path: Path, true: Recording) -> Found:
 
 
 def paired(found: Recording, true: Recording) -> Found:
-    """Whether every row that was read is one sample: its voltage and its position of the same instant."""
+    """Check that every read row is one sample: voltage and position of the same instant."""
     for axis in found.axes:
         if axis not in true.axes:
             return Found("part-and-said" if found.notes else "silent", note="" if found.notes else f"axis {axis}")
@@ -270,7 +270,7 @@ def wrong_messages(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def slips(tries: int, folder: Path) -> Iterator[Found]:
-    """The counter of one or both streams slips by up to 5 somewhere, while its time goes on."""
+    """The counter of one or both streams slips by up to 5 at some point, while its time continues."""
     for number in range(tries):
         random = np.random.default_rng((63, number))
         first, size = 20 * int(random.integers(2, 98)), int(random.choice([-5, -2, -1, 1, 1, 2, 5]))
@@ -280,7 +280,7 @@ def slips(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def jumps(tries: int, folder: Path) -> Iterator[Found]:
-    """The clock of one or both streams jumps by 1 ms to an hour, forth or back, while the counter goes on."""
+    """The clock of one or both streams jumps by 1 ms to an hour, forward or back, while the counter continues."""
     for number in range(tries):
         random = np.random.default_rng((64, number))
         first, size = 20 * int(random.integers(2, 98)), float(random.choice([-1.0, 1.0]) * 10 ** random.uniform(-3, 3.5))
@@ -296,7 +296,7 @@ def _said(found: Found, kinds: tuple[str, ...], first: int) -> Found:
 
 
 def compressed(tries: int, folder: Path) -> Iterator[Found]:
-    """Messages compressed one by one, some of them damaged: the others are read."""
+    """Individually compressed messages, some of them damaged: the others are read."""
     from backports import zstd
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
@@ -324,13 +324,13 @@ def compressed(tries: int, folder: Path) -> Iterator[Found]:
         (path / "metadata.yaml").write_text(text, "utf-8")
         true = truth()
         found = judged(partial(_as_written, path, true), f"seed (65, {number})")
-        # what unpacks has no sum of its own: one message of other numbers at most for each that was damaged
+        # a message that decompresses has no checksum: at most one message with wrong numbers for each damaged one
         unpacked = found.outcome == "silent" and int(found.note.partition(" of ")[0].rpartition(" ")[2]) <= 20 * len(bad)
         yield Found("no sum") if unpacked else found
 
 
 def csv_ends(tries: int, folder: Path) -> Iterator[Found]:
-    """A CSV cut at any byte: whole rows only, and it is said that it was cut."""
+    """A CSV truncated at any byte: only complete rows are read, with a note."""
     true, path = truth(300), folder / "a.csv"
     save(true, path)
     whole = path.read_bytes()
@@ -338,7 +338,7 @@ def csv_ends(tries: int, folder: Path) -> Iterator[Found]:
     for number in range(tries):
         end = int(np.random.default_rng((66, number)).integers(len(whole) // 2, len(whole) - 1))
         path.write_bytes(whole[:end])
-        boundary = whole[end - 1 : end] == b"\n"  # whole rows: nobody can know
+        boundary = whole[end - 1 : end] == b"\n"  # truncation between rows cannot be detected
 
         def look(boundary: bool = boundary) -> Found:
             found = load(path)
@@ -349,7 +349,7 @@ def csv_ends(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def cut_models(tries: int, folder: Path) -> Iterator[Found]:
-    """A model cut anywhere, inside a number above all: ``validate`` refuses it."""
+    """A model truncated anywhere, mostly inside a number: ``validate`` reports an error."""
     from campaigns.faults.attack import command
     from campaigns.faults.damage import rigid
 
@@ -366,7 +366,7 @@ def cut_models(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def refused_writers(tries: int, folder: Path) -> Iterator[Found]:
-    """Names that exist, folders that are files: nothing is overwritten."""
+    """Existing names, and files instead of folders: nothing is overwritten."""
     save(truth(100), folder / "bag")
     (folder / "file").write_text("old")
     for path in (folder / "bag", folder / "file" / "rec.npz", folder / "file" / "bag", folder / ("x" * 300))[:tries]:

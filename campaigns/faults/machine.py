@@ -1,4 +1,4 @@
-"""Real nodes over DDS while the machine is driven: the excitation is killed, or asked for what its state does not allow."""
+"""Real nodes over DDS while the machine is driven: the excitation is killed, or receives transitions that its state does not allow."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ WORDS = (
     "rest, with the drive's watchdog of 50 ms."
 )
 PUSH = ("x.kind:='off'", "x.offset:=1.0", "x.centring:=0.0", "y.kind:='off'", "y.centring:=0.0", "ramp:=0.05", "watchdog:=1.0")
-WAY = 0.03  # m, as docs/real-machine-safely.md says
+WAY = 0.03  # m, bound in docs/real-machine-safely.md
 
 
 @contextmanager
 def driven(folder: Path) -> Iterator[tuple[Scene, list[float]]]:
-    """Machine and excitation, and the places of x as they are heard."""
+    """Machine and excitation, and the received positions of x."""
     from std_msgs.msg import Float64MultiArray
 
     from xy_sysid.cli.monitor import Monitor
@@ -58,7 +58,7 @@ def _beyond(places: list[float], far: float) -> bool:
 
 
 def killed(count: int, folder: Path) -> Iterator[Found]:
-    """kill -9 of the excitation at full push, at a random moment."""
+    """kill -9 of the excitation at full drive, at a random moment."""
     if importlib.util.find_spec("rclpy") is None:
         yield Found("skipped", note="ROS 2 is not installed")
         return
@@ -84,7 +84,7 @@ def _drives_on(here: Scene, sent: int) -> bool:
 
 
 def transitions(count: int, folder: Path) -> Iterator[Found]:
-    """Every transition by number while it drives, allowed or not, deactivate and shutdown last: it drives on, or is at zero volts."""
+    """Every transition by number while it drives, allowed or not, deactivate and shutdown last: it continues, or is at zero volts."""
     if importlib.util.find_spec("rclpy") is None:
         yield Found("skipped", note="ROS 2 is not installed")
         return

@@ -1,4 +1,4 @@
-"""Settings, places, ages and states at random: an axis that was last seen at or beyond a limit gets no outward voltage, and one beyond it ends."""
+"""Random settings, positions, ages and states: an axis last measured at or beyond a limit gets no outward voltage; beyond it, the drive ends."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS = ("noise", "off", "multisine", "sweep", "step", "impulse", "prbs")
 
 
 def axis_settings(random: np.random.Generator) -> dict[str, Any]:
-    """Of one axis."""
+    """Random settings of one axis."""
     low, width = float(random.uniform(-10, 10)), float(10 ** random.uniform(-3, 1.3))
     return {
         "kind": str(random.choice(KINDS)),
@@ -40,13 +40,13 @@ def axis_settings(random: np.random.Generator) -> dict[str, Any]:
 
 
 def place(seq: int, values: list[float]) -> Block:
-    """Positions whose newest has this counter."""
+    """A block of positions; ``seq`` is the counter of the newest."""
     count = np.arange(seq - len(values) + 1, seq + 1, dtype=np.float64)
     return Block(("x",), count, count / RATE, np.array(values)[:, None])
 
 
 def never_outward(tries: int, folder: Path) -> Iterator[Found]:
-    """One draw of settings and a walk of places each."""
+    """Tries with random settings and a random walk of positions."""
     for number in range(tries):
         random = np.random.default_rng((51, number))
         wanted = axis_settings(random)
@@ -82,7 +82,7 @@ def _walked(drive: Drive, wanted: dict[str, Any], random: np.random.Generator, w
 
 
 def outside(tries: int, folder: Path) -> Iterator[Found]:
-    """Beyond a limit by less than a zone, and it stays, creeps outward, or trembles there."""
+    """A position beyond a limit by less than a zone, which stays, creeps outward, or fluctuates."""
     for number in range(tries):
         random = np.random.default_rng((52, number))
         side, beyond = float(random.choice([-1.0, 1.0])), float(random.uniform(0.001, 0.018))

@@ -1,4 +1,4 @@
-"""The nodes on two hosts with a bad cable between them: what is said, what is dropped, how soon it goes on, and whether the response stays right."""
+"""The nodes on two hosts with a bad cable between them: messages, dropped data, time until recovery, and correctness of the response."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ _reference: dict[str, list[float]] = {}
 
 
 def right(response: dict[str, list[float]]) -> float:
-    """Part of the lines that lie in the band around the response without loss."""
+    """Fraction of the lines within the uncertainty of the response without loss."""
     if not response or not _reference or len(response["real"]) != len(_reference["real"]):
         return 0.0
     a, b = ({name: np.array(values, dtype=np.float64) for name, values in one.items()} for one in (response, _reference))
@@ -97,7 +97,7 @@ def _attack(work: Callable[[int, Path], Iterator[Found]]) -> Callable[[int, Path
 
 
 def lossy(part: float, profile: bool) -> Callable[[int, Path], Iterator[Found]]:
-    """So much loss, with or without the profile."""
+    """A given loss, with or without the profile."""
 
     def work(count: int, folder: Path) -> Iterator[Found]:
         found = measure(folder / "loss", "loss", part, SECONDS, profile=profile)
@@ -112,7 +112,7 @@ def lossy(part: float, profile: bool) -> Callable[[int, Path], Iterator[Found]]:
 
 
 def remote_lossy(part: float) -> Callable[[int, Path], Iterator[Found]]:
-    """The excitation is on the other side of the cable, too: it goes on, or ends at zero volts with the reason."""
+    """Loss with the excitation on the other host: it continues, or ends at zero volts with the reason."""
 
     def work(count: int, folder: Path) -> Iterator[Found]:
         found = measure(folder / "remote", "loss", part, SECONDS, remote=True)
@@ -125,7 +125,7 @@ def remote_lossy(part: float) -> Callable[[int, Path], Iterator[Found]]:
 
 
 def cable(away: float, remote: bool) -> Callable[[int, Path], Iterator[Found]]:
-    """The cable is pulled for so long."""
+    """The cable is pulled for ``away`` s."""
 
     def work(count: int, folder: Path) -> Iterator[Found]:
         found = measure(folder / "pulled", "pulled", away, 8.0, remote=remote)
@@ -150,7 +150,7 @@ def killed(count: int, folder: Path) -> Iterator[Found]:
 
 
 def clocks(count: int, folder: Path) -> Iterator[Found]:
-    """Jumps of the clock, and another rate."""
+    """Jumps of the clock, and a change of the rate."""
     found = measure(folder / "clocks", "clocks", 2.0)
     said = str(found["identifier"]) + str(found["streams"]) + str(found["axis"]) + json.dumps(found["reasons"])
     told = {"the rate": "rate" in said, "the clock": "time" in said or "clock" in said or "stamp" in said}

@@ -1,4 +1,4 @@
-"""docs/faults.md from what came of the attacks; a group that was not run keeps what stood there."""
+"""docs/faults.md from the outcomes of the attacks; a group that was not run keeps its old section."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def section(title: str, words: str, rows: Sequence[Row]) -> str:
 
 
 def text(sections: Mapping[str, str], before: str, order: Sequence[str], facts: str) -> str:
-    """The whole page: new sections in place of the old ones of the same title."""
+    """The full page: new sections replace old ones of the same title."""
     old = {part.partition("\n")[0].strip(): f"## {part.rstrip()}\n" for part in re.split(r"^## ", before, flags=re.MULTILINE)[1:]}
     found = {**old, **sections}
     kept = [found[title] for title in order if title in found]

@@ -1,6 +1,6 @@
-"""Recordings of real machines, each through every command that reads one: an answer or one line, no traceback and no warning.
+"""Every command that reads a recording, on recordings of real machines: an answer or one line, without traceback or warning.
 
-They lie in $XY_SYSID_DATA, or in ../shared/data beside the project, and are no part of it.
+The recordings are in $XY_SYSID_DATA, or in ../shared/data next to the project, and are not part of it.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ WORDS = (
     "Every file of the recordings of other people's machines, with the options that it needs, is given to all commands that read a recording: the "
     "result must be an answer or one line. The options are in `campaigns/faults/shared.py`."
 )
-LONGEST = 600.0  # s for one command on a whole recording
+LONGEST = 600.0  # s, limit for one command on a full recording
 DATA = Path(os.environ.get("XY_SYSID_DATA") or Path(__file__).parents[3] / "shared" / "data")
 
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """One file or bag. options: that reading it needs; part: to read a short part of it, which still shows what the machine does."""
+    """One file or bag. options: needed to read it; part: options that select a short part with sufficient motion."""
 
     path: str
     options: tuple[str, ...] = ()
@@ -32,7 +32,7 @@ class Shared:
 
 
 def mapped(columns: str, *options: str) -> tuple[str, ...]:
-    """The options for columns that are not told by their names."""
+    """The options for columns whose names do not identify them."""
     return ("--map", columns, *options)
 
 
@@ -96,9 +96,9 @@ RECORDINGS = (
 )
 NO_RECORDINGS = ("README.md",)
 COMMANDS = ("columns", "fit", "compare", "diagnose", "refine", "report")
-MORE = ("frf", "steps", "servo", "coupling", "fleet")  # which the tests leave to this campaign
+MORE = ("frf", "steps", "servo", "coupling", "fleet")  # commands that the tests leave to this campaign
 LITTLE, BRIEF = ("--set", "length=512"), ("--budget", "0.3")
-RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")  # fit chooses the orders, and the report of the same data need not again
+RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")  # fixed orders for the report, since fit tests the choice of orders
 SHORT = {
     **dict.fromkeys(("frf", "fit", "coupling", "compare"), LITTLE),
     **dict.fromkeys(("diagnose", "refine"), BRIEF),
@@ -107,14 +107,14 @@ SHORT = {
 
 
 def unnamed(folder: Path = DATA) -> list[str]:
-    """Files that no row names; a row that names a folder has all that is in it."""
+    """Files that are in no row; a row with a folder includes all its files."""
     named = tuple(row.path for row in RECORDINGS)
     files = (path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if path.is_file())
     return [file for file in files if file not in NO_RECORDINGS and not any(file == name or file.startswith(f"{name}/") for name in named)]
 
 
 def words(name: str, row: Shared, folder: Path, short: bool) -> list[str]:
-    """A command on a recording; folder: for what it writes."""
+    """The arguments of a command on a recording; folder: for its output."""
     found = [name, *(["--one"] if name == "fleet" else []), str(DATA / row.path)]
     if name == "columns":
         return found
@@ -123,14 +123,14 @@ def words(name: str, row: Shared, folder: Path, short: bool) -> list[str]:
 
 
 def told(name: str, row: Shared, folder: Path, short: bool = False, seconds: float = LONGEST) -> Found:
-    """What came of a command on a recording."""
+    """The outcome of a command on a recording."""
     asked = words(name, row, folder, short)
     what = f"xy-sysid {' '.join(asked)}"
     with warnings.catch_warnings(record=True) as warned, at_most(seconds):
         warnings.simplefilter("always")
         try:
             found = answered(command(*asked), what)
-        except Exception as error:  # noqa: BLE001  whatever it is, it is what is looked for
+        except Exception as error:  # noqa: BLE001  any error is a result of the campaign
             return Found("traceback", note=f"{what}: {type(error).__name__}: {error}")
     if warned:
         return Found("not told", note=f"{what}: {warned[0].category.__name__}: {warned[0].message} ({warned[0].filename}:{warned[0].lineno})")

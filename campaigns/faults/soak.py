@@ -1,7 +1,7 @@
 """python -m campaigns.faults soak [--hours 24] [--speed max|X] [--block N] [--minutes M]: a day of data through all nodes and the page.
 
-Machine, excitation, identifier and the page's server (with one open tab that reads what it is sent), over DDS, as fast as they go. Growth is the
-slope of a straight line through the second half of what was measured, by hour of data. docs/faults.md gets the table.
+Machine, excitation, identifier and the page's server (with one open tab), over DDS, at full speed. Growth is the
+slope of a straight line through the second half of the measurements, per hour of data. The table is written to docs/faults.md.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import numpy as np
 from campaigns.faults.attack import environment
 
 RATE = 2000.0  # Hz
-LOOK = 5.0  # s between two looks at the processes
-FLAT = 5.0  # MB by hour of data that are called flat
+LOOK = 5.0  # s between two readings of the processes
+FLAT = 5.0  # MB per hour of data; less counts as constant
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
 NODES = {"ballscrew": "xy_sim.node", "identifier": "xy_sysid.nodes.identifier", "excitation": "xy_sysid.nodes.excitation"}
 
@@ -44,7 +44,7 @@ def _page(folder: Path, surroundings: dict[str, str]) -> tuple[subprocess.Popen[
 
 
 def _tab(address: str, over: threading.Event) -> None:
-    """A real tab, as long as it lasts; without a browser somebody who asks for the page again and again."""
+    """An open tab until the end; without a browser, repeated requests for the page."""
     import shutil
 
     program = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
@@ -66,7 +66,7 @@ def _tab(address: str, over: threading.Event) -> None:
 
 
 def measure(hours: float, speed: float, block: int, minutes: float) -> tuple[float, dict[str, list[tuple[float, float, int]]], dict[str, str]]:
-    """(h of data, by node (h of data, MB, descriptors) at each look, what the identifier says of its streams)."""
+    """(h of data, by node (h of data, MB, descriptors) at each reading, values of the identifier's status of streams)."""
     from xy_sysid.cli.monitor import Monitor
 
     os.environ.update(ROS_DOMAIN_ID=str(os.getpid() % 90 + 10), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
@@ -114,7 +114,7 @@ Looks = dict[str, list[tuple[float, float, int]]]
 
 
 def table(data: float, asked: argparse.Namespace, looks: Looks, streams: dict[str, str], minutes: float) -> tuple[str, bool]:
-    """The section of the page, and whether everything is flat."""
+    """The section of the page, and True if no process grows."""
     lines = [
         "## Soak",
         "",
@@ -139,7 +139,7 @@ def table(data: float, asked: argparse.Namespace, looks: Looks, streams: dict[st
 
 
 def main(words: list[str]) -> int:
-    """Run, print and write the page; 1 if something grows."""
+    """Run, print and write the page; returns 1 if a process grows."""
     from campaigns.faults.groups import GROUPS
     from campaigns.faults.report import text
 

@@ -1,4 +1,4 @@
-"""Signals that mean nothing, and effect files with errors: an answer that says so or one line, within seconds."""
+"""Meaningless signals, and effect files with errors: an answer that reports the problem, or one line, within seconds."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ STRANGE: dict[str, Callable[[Arrays], Arrays]] = {
     "one sample an hour": lambda a: {**a, "t": a["t"] * 3.6e6},
     "negative gain": lambda a: {**a, "y": -a["y"]},
 }
-MEANT = ("negative gain",)  # a machine may be wired so: the answer is an answer
+MEANT = ("negative gain",)  # valid for a machine with reversed wiring: a normal answer is right
 QUESTIONS: tuple[tuple[str, ...], ...] = (
     ("frf",),
     ("fit", "--set", "numerator_order=0", "--set", "denominator_order=2"),
@@ -92,7 +92,7 @@ SECONDS = 30.0
 
 
 def asked(name: str) -> Callable[[int, Path], Iterator[Found]]:
-    """The questions about one recording."""
+    """Tries of all commands on one recording."""
 
     def tries(count: int, folder: Path) -> Iterator[Found]:
         with np.load(rigid(folder / "true.npz", ROWS)) as file:
@@ -111,7 +111,7 @@ def asked(name: str) -> Callable[[int, Path], Iterator[Found]]:
 
 
 def _processor_time() -> float:
-    """s, of the commands that have ended: whatever else the machine has to do."""
+    """Processor time of the ended commands, s, independent of the load of the computer."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
@@ -137,7 +137,7 @@ def _short(said: Said, question: str, name: str) -> str:
 
 
 def _verdict(answer: dict[str, Any]) -> bool:
-    """Whether an axis is told to be doubtful: by a verdict, a quality, a trusted band that is empty, or words."""
+    """True if the answer reports a doubt about an axis: by a verdict, a quality, an empty trusted band, or words."""
     text = json.dumps(answer).lower()
     words = (
         "not_enough_data",
@@ -242,7 +242,7 @@ INSIDE = (
 
 
 def effect_files(tries: int, folder: Path) -> Iterator[Found]:
-    """The file while it is loaded."""
+    """Errors of an effect file during loading."""
     file = folder / "own.py"
     cases = [*ERRORS] + [f"{GOOD_EFFECT}\n{text}" for text in ERRORS]
     for text in cases[:: max(1, len(cases) // tries)]:
@@ -260,7 +260,7 @@ def effect_files(tries: int, folder: Path) -> Iterator[Found]:
 
 
 def effect_functions(tries: int, folder: Path) -> Iterator[Found]:
-    """Its laws and guesses while a fit uses them."""
+    """Errors of its laws and guesses during a fit."""
     rec, file = rigid(folder / "rec.npz", 6000), folder / "own.py"
     for before, after in INSIDE[:tries]:
         assert before in GOOD_EFFECT

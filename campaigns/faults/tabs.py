@@ -1,4 +1,4 @@
-"""The page under load: fifty tabs, a client that reads nothing, a lost WebSocket, a server that is killed; STOP meanwhile."""
+"""The page under load: fifty tabs, clients that read nothing, a lost WebSocket, a killed server; with STOP during each."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ WORDS = (
 )
 CHROMIUM = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None)
 STOPS = 3.0  # s
-DRAWN = 600.0  # s until every tab of fifty is drawn; all of them share the processors of this one computer
+DRAWN = 600.0  # s, limit until all fifty tabs are drawn, which share the processors of one computer
 MORE = 60.0  # MB
 
 
@@ -45,7 +45,7 @@ def _why_not() -> str:
 
 @dataclass
 class Scene:
-    """Nodes, a page's server and somebody who listens to the voltage."""
+    """Nodes, a page's server, and a subscriber of the voltage."""
 
     folder: Path
     monitor: Any
@@ -54,12 +54,12 @@ class Scene:
     processes: dict[str, Any] = field(default_factory=dict)
 
     def start(self, name: str, *words: str) -> None:
-        """One process."""
+        """Start one process."""
         with (self.folder / f"{name}.log").open("ab") as log:
             self.processes[name] = subprocess.Popen([sys.executable, *words], stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=environment())
 
     def serve(self, port: int = 0) -> None:
-        """The page; its address is the first line that it says."""
+        """Start the page's server; its address is in its first line of output."""
         begun = len(self.said("page"))
         self.start("page", "-m", "xy_sysid", "page", "--port", str(port), "--no-browse", "--folder", str(self.folder))
         assert self.until(lambda: "http://" in self.said("page")[begun:], 180.0), self.said("page")
@@ -67,12 +67,12 @@ class Scene:
         self.address = f"http://{self.address}"
 
     def said(self, name: str) -> str:
-        """All that it wrote."""
+        """The output of a process."""
         path = self.folder / f"{name}.log"
         return path.read_text("utf-8", "replace") if path.exists() else ""
 
     def until(self, done: Callable[[], bool], seconds: float) -> bool:
-        """Listen until it is done."""
+        """Receive messages until ``done``; False after ``seconds``."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if done():
@@ -81,13 +81,13 @@ class Scene:
         return done()
 
     def drive(self) -> None:
-        """STOP is released, then configure and activate, by the page's own means of ROS."""
+        """Release STOP, then configure and activate, with the page's own ROS calls."""
         from lifecycle_msgs.msg import Transition
         from std_srvs.srv import Trigger
 
         release = self.monitor._node.create_client(Trigger, "excitation/release_stop")
         assert self.until(release.service_is_ready, 60.0), self.said("excitation")
-        for _ in range(2):  # the first names whose STOP it is
+        for _ in range(2):  # the first call lists the nodes that hold STOP
             answer = release.call_async(Trigger.Request())
             assert self.until(answer.done, 30.0), self.said("excitation")
         self.monitor._wanted = [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE]
@@ -103,7 +103,7 @@ class Scene:
         self.monitor._node.destroy_client(release)
 
     def stop(self, what: str) -> Found:
-        """POST /stop, and what came of it."""
+        """POST /stop, and its outcome."""
         begun = time.monotonic()
         asked = urllib.request.Request(f"{self.address.rstrip('/')}/stop", method="POST", headers={"X-Requested-With": "xy_sysid"})
         try:
@@ -120,7 +120,7 @@ class Scene:
 
 @contextmanager
 def scene(folder: Path) -> Iterator[Scene]:
-    """Everything that is needed, driven."""
+    """A scene whose machine is driven."""
     from std_msgs.msg import Float64MultiArray
 
     from xy_sysid.cli.monitor import Monitor
@@ -150,7 +150,7 @@ def scene(folder: Path) -> Iterator[Scene]:
 
 @contextmanager
 def browser() -> Iterator[Any]:
-    """One context of a real one, which steps back behind everything else: the tabs of others have other computers."""
+    """A context of a real browser with low priority, because real tabs would be on other computers."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play, tempfile.TemporaryDirectory(prefix="browser_") as name:
@@ -175,7 +175,7 @@ def _drawn(tab: Any) -> bool:
 
 
 def _tells(tab: Any) -> bool:
-    """Whether a tab tells of the STOP; one that loads the page anew at this moment does not yet."""
+    """True if a tab shows the STOP; False while it reloads the page."""
     from playwright.sync_api import Error
 
     try:
@@ -185,7 +185,7 @@ def _tells(tab: Any) -> bool:
 
 
 def fifty(count: int, folder: Path) -> Iterator[Found]:
-    """Fifty tabs, each drawn; STOP; memory and descriptors after they have gone."""
+    """Fifty tabs, all drawn; STOP; memory and descriptors after they are closed."""
     with scene(folder) as here, browser() as made:
         before = memory(here.processes["page"].pid)
         begun = time.monotonic()
@@ -210,7 +210,7 @@ def fifty(count: int, folder: Path) -> Iterator[Found]:
 
 
 def stalled(count: int, folder: Path) -> Iterator[Found]:
-    """Ten clients that open a WebSocket, and read nothing any more."""
+    """Ten clients that open a WebSocket and then read nothing."""
     with scene(folder) as here, browser() as made:
         port = int(here.address.rstrip("/").rpartition(":")[2])
         tab = _tab(made, here.address)
@@ -231,7 +231,7 @@ def stalled(count: int, folder: Path) -> Iterator[Found]:
 
 
 def lost_socket(count: int, folder: Path) -> Iterator[Found]:
-    """The tab's WebSocket is gone, and its STOP button is pressed; a fit runs meanwhile."""
+    """STOP is pressed in a tab that has lost its WebSocket, during a fit."""
     with scene(folder) as here, browser() as made:
         tab = _tab(made, here.address)
         tab.wait_for_selector("#stop", timeout=1000.0 * DRAWN)
@@ -251,7 +251,7 @@ def lost_socket(count: int, folder: Path) -> Iterator[Found]:
 
 
 def restarted(count: int, folder: Path) -> Iterator[Found]:
-    """kill -9 of the server while it drives, and another on the same port: an open tab is drawn again by itself or by a reload, and STOP works."""
+    """kill -9 of the server while it drives, and another on the same port: an open tab recovers, by itself or by a reload, and STOP works."""
     with scene(folder) as here, browser() as made:
         tab = _tab(made, here.address)
         tab.wait_for_selector("#stop", timeout=1000.0 * DRAWN)
@@ -271,7 +271,7 @@ def restarted(count: int, folder: Path) -> Iterator[Found]:
 
 
 def killed_nodes(count: int, folder: Path) -> Iterator[Found]:
-    """kill -9 of the identifier and of the machine while a tab is open: it says who is lost, and STOP works."""
+    """kill -9 of the identifier and of the machine while a tab is open: it names the lost node, and STOP works."""
     with scene(folder) as here, browser() as made:
         tab = _tab(made, here.address)
         tab.wait_for_selector("#stop", timeout=1000.0 * DRAWN)

@@ -17,7 +17,7 @@ SMALL, WIDE = (380, 300), (760, 320)  # px
 
 
 def main(names: list[str]) -> int:
-    """The exit code."""
+    """Make the pictures; returns the exit code."""
     folder = DOCS / "pictures"
     folder.mkdir(exist_ok=True)
     known = [*(example.name for example in EXAMPLES), "ladder", "before_after", "candidates", "response", "page"]

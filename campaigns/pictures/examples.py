@@ -25,9 +25,9 @@ Picture = Callable[..., go.Figure]
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """An effect in the making: its pictures, and what to look at in them.
+    """An example of an effect: its pictures, and the signs of the effect in them.
 
-    size: of the effect, empty for the usual one; machine: that has it; excite: how that is driven, else as usual
+    size: of the effect, empty for the default; machine: file of the machine; excite: changed excitation settings
     """
 
     effect: str
@@ -39,12 +39,12 @@ class Example:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return self.effect or "nothing_missing"
 
     @property
     def typed(self) -> str:
-        """As it is given to ``xy-sysid simulate --effect``; empty for none."""
+        """The value for ``xy-sysid simulate --effect``; empty without an effect."""
         return f"{self.effect}={self.size}" if self.size else self.effect
 
 

@@ -37,7 +37,7 @@ def shoot_page(path: Path) -> None:
                 page.wait_for_function(
                     "words => document.querySelector('[data-part=verdict]')?.textContent.includes(words)", arg=words, timeout=PATIENCE
                 )
-            page.wait_for_timeout(1500)  # the last picture is drawn
+            page.wait_for_timeout(1500)  # until the last figure is drawn
             page.screenshot(path=path)
             made.close()
 

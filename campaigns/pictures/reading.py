@@ -61,7 +61,7 @@ def page() -> str:
 
 
 def picture(example: Example) -> str:
-    """Its file, seen from docs/."""
+    """Path of its file, relative to docs/."""
     return f"pictures/{example.name}.png"
 
 

@@ -1,7 +1,7 @@
 """Figures to PNG, by the browser that also shows the page and the report.
 
-Headless Chromium comes from every distribution and draws exactly what readers see; kaleido, Plotly's own way, either brings
-an old browser of its own or needs this one.
+Headless Chromium comes with every distribution and draws exactly what readers see; kaleido, Plotly's own tool, either brings
+an old browser or needs this one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from plotly.offline import get_plotlyjs
 from xy_sysid.errors import BadInput
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-PAPER = "#ffffff"  # of a picture, so that it reads on a dark page too
+PAPER = "#ffffff"  # background of a picture, readable on a dark page, too
 GAP = 14  # px between figures
 
 

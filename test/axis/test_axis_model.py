@@ -1,4 +1,4 @@
-"""The simulation of one axis: exact where mathematics is, and the same however it is asked."""
+"""The simulation of one axis: exact where a closed form exists, and independent of how it is called."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_the_base_alone_is_the_exact_transfer_function(delay: float) -> None:
 
 
 def test_a_lag_is_one_more_pole() -> None:
-    """To a thousandth: the lag is exact, what it does within a sub-step is taken at its mean."""
+    """To a thousandth: the lag is exact, and within a sub-step its mean is used."""
     lag = 1e-3
     tf = TransferFunction(np.array([0.097 * 246.0 / lag]), np.convolve([1.0, 246.0, 0.0], [1.0, 1.0 / lag]), 1.29e-3)
     u = noise()
@@ -87,7 +87,7 @@ def test_dry_friction_stops_a_moving_axis_at_the_right_instant() -> None:
 
 
 def test_the_sign_of_the_gain_only_turns_the_motion_round() -> None:
-    """A drive wired the other way has the same friction."""
+    """A drive with a negative gain has the same friction."""
     u = noise()
     for name in ("coulomb_friction", "stribeck_friction", "presliding_hysteresis"):
         one = simulate(BASE.with_effect(name), RATE, u, np.zeros_like(u))
@@ -100,7 +100,7 @@ def test_the_sign_of_the_gain_only_turns_the_motion_round() -> None:
     "beside", [{}, {"coulomb_friction": (0.2,)}, {"coulomb_friction": (0.2,), "constant_load": (0.1,)}], ids=lambda made: "+".join(made)
 )
 def test_drag_that_is_a_straight_line_each_way_needs_no_sub_steps(gain: float, beside: dict[str, tuple[float, ...]]) -> None:
-    """What sub-steps come to as they get shorter: at 1 us within 3e-7 of the motion."""
+    """Sub-steps converge as they get shorter: at 1 us within 3e-7 of the motion."""
     straight = EFFECTS["asymmetric_viscous_friction"]
     library = Library([replace(straight, straight=False), *(EFFECTS[name] for name in beside)])
     names, row = [straight.name, *beside], np.array([gain, 1.29e-3, 20.0, -0.6, *(value for values in beside.values() for value in values)])
@@ -120,7 +120,7 @@ def test_an_axis_that_drags_more_one_way_settles_at_two_speeds() -> None:
 
 
 def test_the_result_has_no_jump_as_the_delay_passes_whole_samples() -> None:
-    """What a fit needs: 1e-9 s of delay changes next to nothing, for exact and for stepped laws."""
+    """The result is continuous in the delay, as a fit needs: 1e-9 s changes hardly anything, for exact and for stepped laws."""
     u = noise()
     for name in ("coulomb_friction", "stribeck_friction"):
         values = [simulate(AxisModel(0.097, 1e-3 + shift, 246.0).with_effect(name), RATE, u, np.zeros_like(u)) for shift in (-1e-9, 1e-9)]
@@ -128,7 +128,7 @@ def test_the_result_has_no_jump_as_the_delay_passes_whole_samples() -> None:
 
 
 def test_another_library_gives_the_same_numbers() -> None:
-    """What else is in the loop does not show."""
+    """Other effects in the loop do not change the result."""
     u = noise()
     alone = Library([EFFECTS["coulomb_friction"]])
     one = simulate(AxisModel(0.097, 1.29e-3, 246.0, library=alone).with_effect("coulomb_friction"), RATE, u, np.zeros_like(u))
@@ -136,7 +136,7 @@ def test_another_library_gives_the_same_numbers() -> None:
 
 
 def test_a_new_process_takes_the_compiled_loop_from_the_disk() -> None:
-    """Compiled once by this process, it is there in half a second of processor time (two allowed)."""
+    """Once compiled, it is loaded in half a second of processor time (two allowed)."""
     simulate(BASE, RATE, noise(), np.zeros_like(noise()))
     code = (
         "import time, numpy as np\n"
@@ -165,7 +165,7 @@ def test_a_minute_of_data_is_simulated_in_milliseconds() -> None:
 
 @pytest.mark.parametrize("effect", [effect.name for effect in STANDARD.acting if effect.simulable])
 def test_a_trial_without_gain_is_no_error(effect: str) -> None:
-    """A step of a fit may end at a gain of zero exactly: what laws divide by it is no number, and no error."""
+    """A step of a fit may reach a gain of exactly zero: laws that divide by it give NaN, not an error."""
     voltage = np.random.default_rng(1).normal(size=600)
     values = tuple(item.high if not item.positive and math.isfinite(item.high) else item.typical for item in STANDARD[effect].parameters)
     model = AxisModel(0.0, 1e-3, 200.0, ((effect, values),))

@@ -56,7 +56,7 @@ def transfer(values: tuple[float, ...]) -> TransferFunction:
 @pytest.mark.parametrize("friction", NOTHING)
 @pytest.mark.parametrize(("name", "values"), SHAPES)
 def test_without_friction_the_loop_is_the_linear_machine(name: str, values: tuple[float, ...], friction: str) -> None:
-    """Next to no friction leaves the transfer function, to rounding, and the sampled section, to a thousandth."""
+    """With hardly any friction the result is the transfer function, to rounding, and the sampled section, to a thousandth."""
     u = noise()
     alone = BASE.with_effect(name, values)
     found = simulate(alone.with_effect(friction, NOTHING[friction]), RATE, u, np.zeros_like(u))
@@ -65,7 +65,7 @@ def test_without_friction_the_loop_is_the_linear_machine(name: str, values: tupl
 
 
 def test_two_resonances_stand_in_one_loop() -> None:
-    """Base and screw together: without friction, what one after the other does."""
+    """Base and screw together: without friction, the same as one after the other."""
     u = noise()
     both = BASE.with_effect(*SHAPES[0]).with_effect(*SHAPES[2])
     found = simulate(both.with_effect("coulomb_friction", (1e-12,)), RATE, u, np.zeros_like(u))
@@ -93,7 +93,7 @@ def test_a_vanishing_resonance_leaves_friction_alone(friction: str) -> None:
 
 
 def test_friction_holds_the_axis_while_the_base_swings_and_lets_go() -> None:
-    """Still at the encoder after the voltage is cut; a base that pulls harder than friction tears the axis loose."""
+    """At rest at the encoder after the voltage is cut; a base whose force exceeds friction breaks the axis loose."""
     u = np.concatenate((np.full(2000, 3.0), np.zeros(4001)))
     swinging = BASE.with_effect("base_resonance", (0.2, 10.0, 0.03, 0.1))
     held = simulate(swinging.with_effect("coulomb_friction", (1.0,)), RATE, u, np.zeros_like(u))
@@ -105,7 +105,7 @@ def test_friction_holds_the_axis_while_the_base_swings_and_lets_go() -> None:
 
 
 def test_the_sign_of_the_gain_turns_the_motion_round_with_a_resonance_too() -> None:
-    """A drive wired the other way has the same friction and the same frame."""
+    """A drive with a negative gain has the same friction and the same frame."""
     u = noise()
     for friction in ("coulomb_friction", "stribeck_friction", "presliding_hysteresis"):
         one = simulate(BASE.with_effect(friction).with_effect("base_resonance"), RATE, u, np.zeros_like(u))
@@ -178,7 +178,7 @@ def test_friction_and_resonance_reach_the_floor(machine: str, effects: tuple[str
 
 
 def test_refining_by_itself_finds_friction_on_the_default_machine() -> None:
-    """The table of the paper with Coulomb friction: both are named, and nothing is left."""
+    """The table of the paper with Coulomb friction: both effects are named, and the residual error is at the floor."""
     ladder = refine(table(*CASES[0][:2]))
     assert ladder.explained
     assert set(ladder.effects) == {"base_resonance", "coulomb_friction"}

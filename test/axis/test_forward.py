@@ -1,4 +1,4 @@
-"""An axis on its own: its position follows from its motion."""
+"""Simulation without a measured position: the position follows from the simulated motion."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def driven(volts: FloatArray, centring: float = 0.0, limit: float = 10.0, start:
     ],
 )
 def test_it_moves_as_the_simulation_at_the_position_that_comes_out(effect: str, values: tuple[float, ...] | None) -> None:
-    """What would be recorded is explained by the same model to a thousandth of the motion, as every fit here trusts its laws."""
+    """The same model explains the simulated recording to a thousandth of the motion, the assumed accuracy of laws."""
     model = RIGID.with_effect(effect, values)
     found = move(model, RATE, driven(voltage(2.0), start=0.01))
     again = simulator(model.library, [effect], RATE, found.voltage, found.position)(model.row)
@@ -43,7 +43,7 @@ def test_it_moves_as_the_simulation_at_the_position_that_comes_out(effect: str, 
 
 
 def test_the_pull_brings_it_back_and_the_limit_holds() -> None:
-    """A constant push is held where the pull balances it; no sample leaves the limit."""
+    """Under a constant voltage the axis rests where the centring balances it; no sample exceeds the limit."""
     push = np.full(round(10.0 * RATE), 0.5)
     found = move(RIGID, RATE, driven(push, centring=50.0))
     assert found.position[-1] == pytest.approx(0.5 / 50.0, rel=1e-3)

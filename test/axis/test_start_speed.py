@@ -1,4 +1,4 @@
-"""A recording that was cut out of a longer one begins in motion: how fast, and what a simulation makes of it."""
+"""A recording cut from a longer one begins in motion: its start speed, and the simulation from it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from xy_sysid.axis.model import AxisModel, simulate, start_of
 from xy_sysid.axis.start_speed import start_speed
 
 RATE = 1000.0
-SLOW = AxisModel(0.5, 1e-3, 2.0)  # forgets how it began only after seconds
+SLOW = AxisModel(0.5, 1e-3, 2.0)  # the start speed decays only after seconds
 
 
 def moved(model: AxisModel, seconds: float = 20.0) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) a drive of slow noise, and where it takes the axis from rest, read by an encoder of 0.1 um."""
+    """(n,) a drive of slow noise, and the position from rest, with an encoder of 0.1 um."""
     random = np.random.default_rng(7)
     u = np.convolve(random.standard_normal(int(seconds * RATE) + 1), np.full(40, 40.0**-0.5), "same")
     x = np.concatenate(([0.0], np.cumsum(simulate(model, RATE, u, np.zeros_like(u))) / RATE))
@@ -22,7 +22,7 @@ def moved(model: AxisModel, seconds: float = 20.0) -> tuple[np.ndarray, np.ndarr
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_speed_of_the_first_sample_is_known_as_well_as_is_said(seed: int) -> None:
-    """An even speed, one that changes, and none, read with noise."""
+    """A constant speed, a changing one, and zero, with encoder noise."""
     time, noise = np.arange(400) / RATE, 1e-6 * np.random.default_rng(seed).standard_normal(400)
     for speed, acceleration in ((0.05, 0.0), (-0.2, 3.0), (0.0, 0.0)):
         found, doubt = start_speed(RATE, 0.3 + speed * time + 0.5 * acceleration * time**2 + noise)
@@ -31,7 +31,7 @@ def test_the_speed_of_the_first_sample_is_known_as_well_as_is_said(seed: int) ->
 
 
 def test_what_starts_from_rest_is_not_said_to_move() -> None:
-    """However hard it is driven off: under an even force, and under one that grows."""
+    """At any acceleration: under a constant force, and under a growing one."""
     time = np.arange(400) / RATE
     for way in (0.5 * 8.0 * time**2, 100.0 * time**3, 0.0 * time):
         found, doubt = start_speed(RATE, way)
@@ -44,7 +44,7 @@ def test_what_starts_from_rest_is_not_said_to_move() -> None:
     ids=["rigid", "dry friction", "on its feet"],
 )
 def test_a_model_goes_on_where_a_cut_recording_begins(model: AxisModel, part: float) -> None:
-    """As in the whole recording; from rest it would be wrong for seconds. How a base swings on its feet at the start is not known."""
+    """As in the full recording; from rest it would be wrong for seconds. The initial oscillation of a base is not known."""
     u, x = moved(model)
     whole = np.diff(x) * RATE
     for cut in (3333, 6000, 9001):

@@ -1,4 +1,4 @@
-"""Every writer writes whole or not at all: a full disk leaves the old file, one line, and nothing beside it."""
+"""Every writer writes completely or not at all: after a full disk the old file remains, with an error of one line and no partial file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OLD = b"what was there before"
 
 @contextmanager
 def full_disk(room: int = 300) -> Iterator[None]:
-    """No file can grow beyond so many bytes: a write fails in its middle, as it does on a full disk."""
+    """No file can grow beyond this many bytes: a write fails in its middle, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
     try:
@@ -60,7 +60,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name != "bag"])
 def test_a_full_disk_leaves_the_old_file_whole_and_says_which(name: str, rec: Path, tmp_path: Path) -> None:
-    """The old bytes are there, one line names the file, no stump stays beside it."""
+    """The old bytes remain, one line names the file, and no partial file is left."""
     out = tmp_path / "out"
     out.write_bytes(OLD)
     words = [{"REC": rec, "OUT": out}.get(word, word) for word in COMMANDS[name]]
@@ -72,7 +72,7 @@ def test_a_full_disk_leaves_the_old_file_whole_and_says_which(name: str, rec: Pa
 
 @pytest.mark.parametrize("ending", ["", ".npz", ".mat", ".csv", ".db3", ".mcap"])
 def test_a_recording_that_does_not_fit_on_the_disk_leaves_nothing(ending: str, rec: Path, tmp_path: Path) -> None:
-    """simulate in every format: one line that names what was to be made, and an empty folder."""
+    """simulate in every format: one line that names the file, and an empty folder."""
     out = tmp_path / f"rec{ending}"
     with full_disk(20_000):
         said = cli("simulate", out, "--duration", "2")
@@ -82,7 +82,7 @@ def test_a_recording_that_does_not_fit_on_the_disk_leaves_nothing(ending: str, r
 
 @pytest.mark.parametrize("ending", [".npz", ".mat", ".csv", ".db3", ".mcap", ""])
 def test_save_is_whole_or_not_at_all(ending: str, tmp_path: Path) -> None:
-    """The library's own save, not the command alone: the old file stays, or nothing is there."""
+    """Also the library's save, not only the command: the old file remains, or no file."""
     path = tmp_path / f"rec{ending}"
     table = ending in (".npz", ".mat", ".csv")
     if table:
@@ -93,7 +93,7 @@ def test_save_is_whole_or_not_at_all(ending: str, tmp_path: Path) -> None:
 
 
 def test_a_state_that_does_not_fit_leaves_the_old_one(tmp_path: Path) -> None:
-    """The identifier's memory is what it was."""
+    """The identifier's saved state is unchanged."""
     path = tmp_path / "state.npz"
     save_state(path, {"a": np.arange(3.0)})
     with full_disk(), pytest.raises(BadRecording, match=r"state\.npz: cannot be written"):
@@ -102,7 +102,7 @@ def test_a_state_that_does_not_fit_leaves_the_old_one(tmp_path: Path) -> None:
 
 
 def test_the_file_is_on_the_disk_before_it_takes_the_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """First fsync of what was written, then the rename, then fsync of the folder: a lost supply cannot leave an empty file."""
+    """First fsync of the new file, then the rename, then fsync of the folder: a power failure cannot leave an empty file."""
     done: list[str] = []
 
     real_fsync, real_replace = os.fsync, Path.replace
@@ -133,7 +133,7 @@ with whole(Path(sys.argv[1])) as part:
 
 
 def test_what_kill_9_leaves_is_removed_by_the_next_writer_and_what_the_living_write_is_not(tmp_path: Path) -> None:
-    """Two writers at work in one folder. The first is killed: a third writer removes what it left, and the second still ends well."""
+    """Two writers in one folder. The first is killed: a third writer removes its remains, and the second still succeeds."""
     writers = [
         subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path / name)], stdout=subprocess.PIPE, env=bare()) for name in ("first", "second")
     ]
@@ -155,7 +155,7 @@ def test_what_kill_9_leaves_is_removed_by_the_next_writer_and_what_the_living_wr
 
 
 def test_only_the_folders_of_writers_are_removed(tmp_path: Path) -> None:
-    """A folder of somebody whose name begins alike stays, and so does a link, with what it leads to."""
+    """Another folder with a similar name is kept, and so is a link with its target."""
     own, link = tmp_path / ".xy_part_of_mine", tmp_path / f".xy_part_{'0' * 16}"
     own.mkdir()
     (own / "kept").write_bytes(OLD)
@@ -165,7 +165,7 @@ def test_only_the_folders_of_writers_are_removed(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_removed_before_its_writer_has_locked_it_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another writer may look between the two; what is written is whole all the same."""
+    """Another writer may look between the two steps; the file is complete nevertheless."""
     real, removed = os.open, list[str]()
 
     def slow(path: str | Path, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
@@ -196,7 +196,7 @@ def test_what_ends_the_work_in_its_middle_leaves_the_old_file(problem: BaseExcep
 
 
 def test_links_modes_and_streams_are_what_they_were(tmp_path: Path) -> None:
-    """A link goes on pointing, a file keeps its mode, a new one has the usual mode, and a device is written to and not replaced."""
+    """A link is kept, a file keeps its mode, a new file has the default mode, and a device is written to, not replaced."""
     real, link = tmp_path / "real.txt", tmp_path / "link.txt"
     write_text(real, "one")
     other = tmp_path / "other.txt"
@@ -224,7 +224,7 @@ def _cut(text: str) -> str:
     ],
 )
 def test_a_cut_or_changed_model_is_refused(change: Callable[[str], str], words: str, rec: Path, tmp_path: Path) -> None:
-    """A stump that ends inside a number is no model, with or without the line that holds the sum."""
+    """A file truncated inside a number is not a model, with or without the line with the checksum."""
     model = tmp_path / "m.yaml"
     assert cli("fit", rec, *RIGID, "--model", model).code == 0
     assert cli("validate", rec, model, *RIGID).code == 0
@@ -236,7 +236,7 @@ def test_a_cut_or_changed_model_is_refused(change: Callable[[str], str], words: 
 
 
 def test_a_model_without_the_sum_loads(rec: Path, tmp_path: Path) -> None:
-    """Of an older version, or changed by hand and the line deleted, as it says."""
+    """A file of an older version, or one changed by hand after its checksum line was deleted, as that line suggests."""
     model = tmp_path / "m.yaml"
     assert cli("fit", rec, *RIGID, "--model", model).code == 0
     first, _, rest = model.read_text().partition("\n")

@@ -1,4 +1,4 @@
-"""A bad bag gives what is there with a note, or one clear line: never a traceback, never wrong numbers."""
+"""A damaged bag gives its readable part with a note, or one clear line: never a traceback, never wrong numbers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def error_of(path: Path) -> str:
 
 @STORAGES
 def test_a_bag_cut_short_gives_what_is_left(tmp_path: Path, storage: str) -> None:
-    """Cut anywhere: samples that are read are the right ones, there is a note, and most of what is left is read."""
+    """Truncated anywhere: the read samples are right, there is a note, and most of the remaining data are read."""
     bag = a_bag(tmp_path / "bag", both(range(0, 20_000, 20)), storage=storage)
     file = the_file(bag)
     whole = file.read_bytes()
@@ -70,7 +70,7 @@ def test_a_bag_with_wrong_bytes_never_ends_in_a_traceback(tmp_path: Path, storag
 
 
 def test_a_damaged_chunk_is_left_out(tmp_path: Path) -> None:
-    """MCAP chunks carry a checksum: a wrong byte costs its chunk, not the truth of the rest."""
+    """MCAP chunks have a checksum: a wrong byte loses its chunk, and the rest is right."""
     path = tmp_path / "bag"
     in_chunks(path, "mcap", 4000)
     raw = bytearray(the_file(path).read_bytes())
@@ -96,7 +96,7 @@ def test_a_file_that_metadata_names_is_not_there(tmp_path: Path, storage: str) -
 
 
 def test_counts_that_do_not_fit_are_said(tmp_path: Path) -> None:
-    """metadata.yaml claims more messages than there are: read, and noted."""
+    """metadata.yaml gives too many messages: the bag is read, with a note."""
     bag = a_bag(tmp_path / "bag", both(range(0, 400, 20)))
     content = yaml.safe_load((bag / "metadata.yaml").read_text())
     content["rosbag2_bagfile_information"]["topics_with_message_count"][0]["message_count"] = 999
@@ -110,7 +110,7 @@ def test_counts_that_do_not_fit_are_said(tmp_path: Path) -> None:
     "text", ["", "{", "- 1\n- 2\n", "rosbag2_bagfile_information: 3", "rosbag2_bagfile_information: {relative_file_paths: [1]}", "\xff\xfe"]
 )
 def test_metadata_that_is_none_does_not_matter(tmp_path: Path, text: str) -> None:
-    """The files in the folder are read with a note; alone it is one line."""
+    """The files in the folder are read with a note; without them there is one line."""
     bag = a_bag(tmp_path / "bag", both(range(0, 400, 20)))
     (bag / "metadata.yaml").write_bytes(text.encode("latin-1"))
     recording = load(bag)
@@ -121,7 +121,7 @@ def test_metadata_that_is_none_does_not_matter(tmp_path: Path, text: str) -> Non
 
 @STORAGES
 def test_an_empty_bag_is_one_line(tmp_path: Path, storage: str) -> None:
-    """No topics, or topics without messages: the line says what there is."""
+    """No topics, or topics without messages: the error line says so."""
     a_bag(tmp_path / "none", [], storage=storage)
     assert "no topics" in error_of(tmp_path / "none")
     bag = a_bag(tmp_path / "one", both([0])[:1], storage=storage)
@@ -130,14 +130,14 @@ def test_an_empty_bag_is_one_line(tmp_path: Path, storage: str) -> None:
 
 @STORAGES
 def test_a_foreign_bag_says_what_it_has(tmp_path: Path, storage: str) -> None:
-    """A bag without such topics: the ones it has are named, and the options that choose others."""
+    """A bag without the default topics: the error lists its topics, and the options to choose them."""
     bag = a_bag(tmp_path / "bag", [("/gantry/drive", both([0])[0][1])], storage=storage)
     text = error_of(bag)
     assert "/gantry/drive (Float64MultiArray)" in text and "--topic voltage=" in text
 
 
 def test_what_is_no_bag_is_one_line(tmp_path: Path) -> None:
-    """Zero bytes, a text, an empty folder, another sqlite database, a missing path: each says what it is."""
+    """Zero bytes, a text, an empty folder, another sqlite database, a missing path: each error names the cause."""
     (tmp_path / "empty.db3").touch()
     (tmp_path / "empty.mcap").touch()
     (tmp_path / "text.db3").write_text("hello " * 1000)
@@ -158,7 +158,7 @@ def test_what_is_no_bag_is_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
 def test_no_permission_is_one_line(tmp_path: Path) -> None:
-    """A bag that may not be read: the line says so."""
+    """A bag without read permission: the error says so."""
     bag = a_bag(tmp_path / "bag", both(range(0, 400, 20)))
     the_file(bag).chmod(0)
     assert "Permission denied" in error_of(bag)

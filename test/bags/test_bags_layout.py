@@ -1,4 +1,4 @@
-"""Messages become arrays without being deserialized one by one, and never wrongly."""
+"""Messages are converted to arrays without deserializing each, and always correctly."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_layout_says_where_the_numbers_are(little: bool) -> None:
 
 
 def test_a_joint_state_gives_stamp_position_and_effort() -> None:
-    """Fields of any length before the numbers do not move what is read."""
+    """Fields of any length before the numbers do not change the result."""
     random = np.random.default_rng(1)
     position, effort = random.normal(size=(50, 3)), random.normal(size=(50, 3))
     names = ("a", "lift_joint", "c3")
@@ -59,7 +59,7 @@ def test_a_joint_state_gives_stamp_position_and_effort() -> None:
 
 
 def test_padding_is_not_looked_at() -> None:
-    """Padding is uninitialised memory: messages that differ only there are of one layout."""
+    """Padding is uninitialised memory: messages that differ only in padding have one layout."""
     plain = joint_state(5, np.array([1.0, 2.0]), None, ("x", "y"), "odd")
     fixed = joint_layout(plain).fixed
     numbers = {i for offset, count in joint_layout(plain).parts for i in range(offset, offset + 8 * count)} | set(range(4, 12))
@@ -72,14 +72,14 @@ def test_padding_is_not_looked_at() -> None:
 
 
 def test_a_changed_label_is_a_new_layout() -> None:
-    """Equal length is no proof: columns in another order are noticed."""
+    """Equal length is not sufficient: columns in another order are detected."""
     batch = a_batch([block_message(0, axes=("x", "y")), block_message(20, axes=("y", "x")), block_message(40, axes=("x", "y"))])
     found = [stretch.layout.names[1] for stretch in Reader(array_layout).stretches(batch) if stretch.layout]
     assert found == ["seq,time,x,y", "seq,time,y,x", "seq,time,x,y"]
 
 
 def test_a_mixture_of_layouts_is_read_like_message_by_message() -> None:
-    """Whatever the order of layouts, and with broken messages between, every readable message gives its own numbers."""
+    """In any order of layouts, and with broken messages between them, every readable message gives its own numbers."""
     random = np.random.default_rng(2)
     messages, expected = [], []
     for count in range(400):

@@ -1,4 +1,4 @@
-"""Bags written here or elsewhere give their samples, in order and in flat pieces."""
+"""Bags of this or other recorders give their samples, in order and in blocks of limited size."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_a_database_with_pages_of_any_size_is_read(tmp_path: Path, size: int) ->
 
 @STORAGES
 def test_the_two_topics_stay_side_by_side(tmp_path: Path, storage: str) -> None:
-    """At no place in the stream is one topic more than 2000 samples ahead, and pieces are no smaller than they must be."""
+    """At no point of the stream is one topic more than 2000 samples ahead, and blocks are not smaller than necessary."""
     place = {"voltage": 0.0, "position": 0.0}
     blocks = 0
     for kind, content in stream_blocks(a_bag(tmp_path / "bag", both(range(0, 100_000, 20)), storage=storage)):
@@ -89,7 +89,7 @@ def test_the_two_topics_stay_side_by_side(tmp_path: Path, storage: str) -> None:
 
 @STORAGES
 def test_the_log_order_is_kept(tmp_path: Path, storage: str) -> None:
-    """A block that came late comes late again."""
+    """A block that arrived late also comes late from the bag."""
     order = [0, 20, 60, 80, 40, 100]
     found = [b for k, b in stream_blocks(a_bag(tmp_path / "bag", both(order), storage=storage)) if k == "voltage"]
     assert np.concatenate([b.seq for b in found])[::20].tolist() == order
@@ -98,7 +98,7 @@ def test_the_log_order_is_kept(tmp_path: Path, storage: str) -> None:
 @STORAGES
 @pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.FILE, CompressionMode.MESSAGE, CompressionMode.STORAGE])
 def test_a_bag_of_plain_rosbags_is_read(tmp_path: Path, storage: str, mode: CompressionMode) -> None:
-    """Bags of others are read in all compressions that rosbag2 knows."""
+    """Bags of other recorders are read with all compressions of rosbag2."""
     if (storage, mode) in (("sqlite3", CompressionMode.STORAGE), ("mcap", CompressionMode.MESSAGE)):
         pytest.skip("rosbag2 has no such combination")
     notes: list[str] = []
@@ -156,7 +156,7 @@ def test_a_bag_split_over_files_is_one_recording(tmp_path: Path, storage: str) -
 
 @STORAGES
 def test_foreign_topics_are_passed_over(tmp_path: Path, storage: str) -> None:
-    """Other topics between, small or large, change nothing."""
+    """Other topics in between, small or large, have no effect."""
     messages = both(range(0, 4000, 20))
     with BagWriter(tmp_path / "bag", cast("Storage", storage)) as writer:
         for count, (kind, content) in enumerate(messages):
@@ -179,7 +179,7 @@ def test_a_database_with_holes_is_read(tmp_path: Path) -> None:
         large = [(topic, time, encode_array(("sample", "seq,time,x,y"), (900, 4), pack(numbered(50_000, 900)))) for topic, time, _ in rows[:20]]
         database.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES(?,?,?)", rows + large)
     database.close()
-    (bag / "metadata.yaml").unlink()  # and with it the sums of what was there before
+    (bag / "metadata.yaml").unlink()  # and with it the checksums of the earlier content
     found = list(stream_blocks(bag, chunk_samples=10**9))
     with Reader(bag / "bag.db3") as reader:
         expected = [STORE.deserialize_cdr(raw, ARRAY_TYPE).data for c, _, raw in reader.messages() if c.topic == "/xy/voltage"]
@@ -188,7 +188,7 @@ def test_a_database_with_holes_is_read(tmp_path: Path) -> None:
 
 
 def test_rows_that_only_a_log_holds_are_read(tmp_path: Path) -> None:
-    """While a database is being written in WAL mode its newest rows are beside it; they count."""
+    """In WAL mode the newest rows of a database are in a separate file; they are read, too."""
     import sqlite3
 
     bag = a_bag(tmp_path / "bag", both(range(0, 2000, 20)))

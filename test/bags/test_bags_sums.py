@@ -1,4 +1,4 @@
-"""Our recorder sums up what it writes to sqlite3; replay and fit see a value that has changed since."""
+"""Our recorder stores checksums of sqlite3 bags; replay and fit detect a changed value."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROWS = "SELECT topics.name, messages.data FROM messages JOIN topics ON topics.id
 
 @pytest.fixture
 def bag(tmp_path: Path) -> Path:
-    """Eight seconds; whatever writes sqlite3 here adds the sums, as the recorder node does."""
+    """Eight seconds of samples; every writer of sqlite3 here adds the checksums, as the recorder node does."""
     path = tmp_path / "bag"
     assert cli("simulate", path, "--duration", "8").code == 0
     return path
@@ -35,7 +35,7 @@ def _change_one_byte(bag: Path, place: int = 3000) -> None:
 
 @pytest.mark.parametrize("words", [("replay", "--set", "length=1024"), ("fit", *RIGID), ("frf",)])
 def test_a_changed_value_is_seen(words: tuple[str, ...], bag: Path) -> None:
-    """One bit of one position: refused with the topic, and what to do to read it all the same; before, it is read."""
+    """One changed bit of one position: an error with the topic, and the way to read it nevertheless; without the change it is read."""
     command = (words[0], bag, *words[1:])
     assert cli(*command).code == 0
     _change_one_byte(bag)
@@ -47,7 +47,7 @@ def test_a_changed_value_is_seen(words: tuple[str, ...], bag: Path) -> None:
 
 
 def test_what_a_killed_recorder_wrote_after_its_last_sum_is_read(bag: Path) -> None:
-    """More messages than were summed up are no damage, a change among the summed ones is."""
+    """More messages than in the checksum are no damage; a change among those in the checksum is."""
     metadata = bag / "metadata.yaml"
     sums = Sums()
     with closing(sqlite3.connect(bag / "bag.db3")) as file:
@@ -65,7 +65,7 @@ def test_what_a_killed_recorder_wrote_after_its_last_sum_is_read(bag: Path) -> N
 
 
 def test_the_library_and_the_page_see_it_too(bag: Path) -> None:
-    """Not the commands alone: whoever opens the bag."""
+    """The check applies to every reader of the bag, not only to commands."""
     assert len(load(bag)) == 16_000
     _change_one_byte(bag)
     with pytest.raises(BadRecording, match="not those that were recorded"):
@@ -73,7 +73,7 @@ def test_the_library_and_the_page_see_it_too(bag: Path) -> None:
 
 
 def test_where_damage_hides_the_sums_it_is_said_that_numbers_may_be_wrong(bag: Path) -> None:
-    """A page of the file with random bytes: what can be read is read, and nobody takes it for checked."""
+    """A page of the file with random bytes: the rest is read, and not reported as checked."""
     file = bag / "bag.db3"
     whole = bytearray(file.read_bytes())
     whole[40 * 4096 : 41 * 4096] = np.random.default_rng(1).bytes(4096)
@@ -89,6 +89,6 @@ def test_where_damage_hides_the_sums_it_is_said_that_numbers_may_be_wrong(bag: P
     "text", ["", "[", "{}", "[1]", "[" * 100_000, '{"rosbag2_bagfile_information": {"custom_data": {"xy_sysid_crc32": "{\\"a\\": 1}"}}}']
 )
 def test_strange_metadata_has_no_sums_and_does_no_harm(text: str, tmp_path: Path) -> None:
-    """Who reads the bag says what is wrong with it."""
+    """The reader reports the damage."""
     (tmp_path / "metadata.yaml").write_text(text)
     assert check_sums(tmp_path) == check_sums(tmp_path / "none") == "none"

@@ -1,4 +1,4 @@
-"""A bag written here opens anywhere, and survives whoever writes it."""
+"""Other tools open a bag written here, and it survives the end of its writer."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ for count in range(10**9):
 
 @STORAGES
 def test_plain_rosbags_opens_what_is_written(tmp_path: Path, storage: str) -> None:
-    """Topics, types, counts, times and every message are what rosbags finds, in the folder and in the file alone."""
+    """rosbags reads the same topics, types, counts, times and messages, from the folder and from the file alone."""
     messages = both(range(0, 4000, 20))
     bag = a_bag(tmp_path / "bag", messages, storage=storage)
     (file,) = [item for item in bag.iterdir() if item.suffix != ".yaml"]
@@ -60,7 +60,7 @@ def test_plain_rosbags_opens_what_is_written(tmp_path: Path, storage: str) -> No
 
 @STORAGES
 def test_any_message_can_be_kept(tmp_path: Path, storage: str) -> None:
-    """Serialized messages of any type, also one that nobody knows, and arrays of any labels are kept byte for byte."""
+    """Serialized messages of any type, also an unknown one, and arrays with any labels are kept byte for byte."""
     raw = joint_state(5, np.array([1.0, 2.0]))
     with BagWriter(tmp_path / "bag", cast("Storage", storage)) as writer:
         writer.write_raw("/joint_states", JOINT_TYPE, raw, 10)
@@ -76,7 +76,7 @@ def test_any_message_can_be_kept(tmp_path: Path, storage: str) -> None:
 
 @STORAGES
 def test_a_killed_recorder_loses_at_most_two_seconds(tmp_path: Path, storage: str) -> None:
-    """After kill -9 in the middle, what was written up to 2 s before is there, here and with plain rosbags."""
+    """After kill -9, all data older than 2 s are readable, here and with rosbags."""
     path = tmp_path / "bag"
     script = ENDLESS.format(root=str(ROOT), path=str(path), storage=storage)
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
@@ -114,7 +114,7 @@ def test_flush_makes_the_bag_complete_so_far(tmp_path: Path, storage: str) -> No
 
 @STORAGES
 def test_writing_waits_for_nothing(tmp_path: Path, storage: str) -> None:
-    """A message of 20 samples costs a recorder less than a tenth of the processor in the time that it covers."""
+    """A recorder needs less than a tenth of a processor in real time with messages of 20 samples."""
     messages = both(range(0, 20_000, 20))
     begin = time.process_time()
     a_bag(tmp_path / "bag", messages, storage=storage)
@@ -122,7 +122,7 @@ def test_writing_waits_for_nothing(tmp_path: Path, storage: str) -> None:
 
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
-    """An existing folder or file is left alone, and one line says so."""
+    """An existing folder or file is not changed, and one line says so."""
     a_bag(tmp_path / "bag", both([0]))
     for path in (tmp_path / "bag", tmp_path):
         with pytest.raises(BadRecording, match="exists already"):
@@ -134,7 +134,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
 
 
 def test_a_wrong_storage_or_place_is_one_line(tmp_path: Path) -> None:
-    """The value, what is allowed and what to do are said."""
+    """The error gives the value, the allowed values and the next action."""
     with pytest.raises(BadInput, match="allowed: sqlite3, mcap"):
         BagWriter(tmp_path / "bag", cast("Storage", "rosbag1"))
     with pytest.raises(BadInput, match="mcap"):
@@ -146,7 +146,7 @@ def test_a_wrong_storage_or_place_is_one_line(tmp_path: Path) -> None:
 
 @STORAGES
 def test_what_is_flushed_is_on_the_disk(tmp_path: Path, storage: str) -> None:
-    """A lost supply: each flush waits for the disk (the system calls are counted), the file that holds the samples as the one that describes it."""
+    """Power failure: each flush waits for the disk (the system calls are counted), for the file with samples and for metadata.yaml."""
     program = f"""
 import sys
 sys.path.insert(0, {str(ROOT)!r} + "/test")
@@ -168,4 +168,4 @@ print(writer.writer.database.execute("PRAGMA synchronous").fetchone()[0] if {sto
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=True)
     counts, level = done.stdout.splitlines()
     assert counts == ("1 0" if storage == "sqlite3" else "1 1")
-    assert storage == "mcap" or level == "2"  # sqlite's own FULL
+    assert storage == "mcap" or level == "2"  # sqlite's value for FULL

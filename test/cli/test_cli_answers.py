@@ -1,4 +1,4 @@
-"""simulate, frf, fit, validate and replay: what each answers, for people and as one JSON document."""
+"""simulate, frf, fit, validate and replay: the answer of each, as text and as one JSON document."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from xy_sysid.settings import IdentifierSettings
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the recordings of these tests lie; a name that no terminal likes."""
+    """The folder of the recordings, with a name that is difficult for a terminal."""
     return tmp_path_factory.mktemp("käse [bold] :car: 日本")
 
 
 @pytest.fixture(scope="module")
 def paper(folder: Path) -> Path:
-    """30 s of the paper's table, and the truth beside it."""
+    """30 s of the paper's table, with a file of the true parameters."""
     said = cli("simulate", folder / "paper", "--duration", 30, "--truth", folder / "truth.json")
     assert said.code == 0 and said.err == ""
     return folder / "paper"
@@ -49,7 +49,7 @@ def model(paper: Path) -> Path:
 
 
 def test_a_search_by_itself_goes_on_after_a_resonance_that_was_given(paper: Path) -> None:
-    """Its first effect is the given one; the table has no other."""
+    """The first effect is the given one; the table has no other effects."""
     said = cli("refine", paper, "-a", "x", "--add", "base_resonance", "--auto", "--span", "0:15")
     assert said.code == 0 and said.err == "" and "base_resonance" in said.out
 
@@ -61,7 +61,7 @@ def test_the_program_says_which_version_it_is() -> None:
 
 @pytest.mark.parametrize("name", ["folder", "one.db3", "one.mcap", "one.csv", "one.npz", "one.mat"])
 def test_simulate_writes_every_kind_of_file_and_they_hold_the_same(name: str, tmp_path: Path) -> None:
-    """One machine, one seed: the samples do not depend on the file; nothing is overwritten."""
+    """With one machine and one seed the samples do not depend on the file format; nothing is overwritten."""
     said = cli("simulate", tmp_path / name, "--duration", 1, "--json")
     assert said.code == 0 and said.err == ""
     assert said.json["samples"] == 2000 and said.json["sampling_rate"] == 2000.0
@@ -87,7 +87,7 @@ def test_simulate_tells_the_truth_unless_it_is_hidden(paper: Path, tmp_path: Pat
 
 
 def test_simulate_cleanly_has_no_encoder_steps(tmp_path: Path) -> None:
-    """--clean: positions off the 0.5 um grid; --excite: another signal; off keeps the axis at rest, and is a word, not a truth value."""
+    """--clean: positions off the 0.5 um grid; --excite: another signal; off keeps the axis at rest, and is a word, not a boolean."""
     for name, options in (
         ("noisy", ()),
         ("clean", ("--clean",)),
@@ -104,7 +104,7 @@ def test_simulate_cleanly_has_no_encoder_steps(tmp_path: Path) -> None:
 
 
 def test_frf_prints_a_table_that_fits_80_columns_and_writes_csv(paper: Path) -> None:
-    """16 lines an axis with dB, phase, coherence, sigma; the file has every line."""
+    """16 lines per axis with dB, phase, coherence, sigma; the file has every line."""
     path = paper.with_name("frf.csv")
     said = cli("frf", paper, "--csv", path)
     assert said.code == 0 and said.err == ""
@@ -138,7 +138,7 @@ def test_fit_finds_the_truth_and_says_how_sure_it_is(paper: Path) -> None:
 
 
 def test_fit_for_people_is_a_table_with_units_and_verdicts(paper: Path) -> None:
-    """ms and mm/s/V as people read them; one line a verdict; nothing on stderr when all is well."""
+    """Display units ms and mm/s/V; one line per verdict; nothing on stderr without a problem."""
     said = cli("fit", paper, "--axis", "x")
     assert said.code == 0 and said.err == ""
     lines = said.out.splitlines()
@@ -152,7 +152,7 @@ def test_fit_for_people_is_a_table_with_units_and_verdicts(paper: Path) -> None:
 
 @pytest.mark.parametrize("method", ["lls", "iwls", "nlls", "ml", "nllsfdi"])
 def test_fit_knows_every_method(method: str, paper: Path) -> None:
-    """Each answers, names itself, and gives a resonance near the truth; the paper's own path absorbs the delay."""
+    """Each method answers, gives its name, and a resonance near the truth; the paper's method absorbs the delay."""
     found = cli("fit", paper, "--axis", "x", "--method", method, "--json").json["axes"]["x"]
     assert found["method"] == {"nlls": "levenberg_marquardt"}.get(method, method) and np.isfinite(found["relative_error"])
     assert (found["transfer_function"]["delay"] == 0.0) == (method == "nllsfdi")
@@ -177,7 +177,7 @@ def test_fit_in_z_is_a_discrete_model_that_validates(paper: Path, tmp_path: Path
 
 
 def test_fit_keeps_the_last_part_out(paper: Path) -> None:
-    """--held-out: its simulation covers that part, less the half second in which the start is forgotten; 0 means no such check."""
+    """--held-out: its simulation covers that part, except the first half second, in which the start decays; 0 means no such check."""
     half = cli("fit", paper, "--axis", "x", "--held-out", 0.5, "--json").json["axes"]["x"]["validation"]["simulation"]
     assert half["seconds"] == pytest.approx(14.5, abs=0.01) and half["nrmse"] > 95 and half["compared"] == "velocity"
     assert cli("fit", paper, "--axis", "x", "--held-out", 0, "--json").json["axes"]["x"]["validation"]["simulation"] is None
@@ -195,7 +195,7 @@ def test_the_model_files_reload(model: Path) -> None:
 
 
 def test_validate_holds_on_the_same_machine_and_says_where_another_is_off(model: Path, folder: Path) -> None:
-    """Another seed: at the noise floor. Loosened bolts: off, most near the 47 Hz pair. The very same data: no validation."""
+    """Another seed: at the noise floor. Loosened bolts: an error, largest near the 47 Hz pair. The same data: no validation."""
     assert cli("simulate", folder / "other", "--duration", 30, "--seed", 100).code == 0
     holds = cli("validate", folder / "other", model)
     assert holds.code == 0 and holds.err == "" and holds.out.count("the model holds") == 2
@@ -211,7 +211,7 @@ def test_validate_holds_on_the_same_machine_and_says_where_another_is_off(model:
 
 
 def test_replay_gives_what_the_plain_logic_gives(paper: Path, tmp_path: Path) -> None:
-    """Table, JSON and bag: the bag holds the very bytes of the updates, in order."""
+    """Table, JSON and bag: the bag holds exactly the bytes of the updates, in order."""
     from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore
 
@@ -233,7 +233,7 @@ def test_replay_gives_what_the_plain_logic_gives(paper: Path, tmp_path: Path) ->
 
 
 def test_json_is_one_document_and_progress_stays_off_a_pipe(paper: Path, model: Path) -> None:
-    """Nothing but the document on stdout, nothing on stderr that is not a sentence."""
+    """Only the document on stdout, and only sentences on stderr."""
     for arguments in (("frf", paper), ("fit", paper, "--axis", "x"), ("validate", paper, model), ("replay", paper)):
         said = cli(*arguments, "--json")
         assert said.code == 0 and isinstance(said.json, dict) and said.out.endswith("}\n") and said.out.count("\n") == 1
@@ -241,7 +241,7 @@ def test_json_is_one_document_and_progress_stays_off_a_pipe(paper: Path, model: 
 
 
 def test_parameter_files_settings_and_spans_change_the_answer(paper: Path, tmp_path: Path) -> None:
-    """--params as the nodes read them, --set on top of it, --span in seconds."""
+    """--params as read by the nodes, with --set on top of it, --span in seconds."""
     (tmp_path / "p.yaml").write_text("/**/identifier:\n  ros__parameters:\n    length: 2048\n    window: blackman\n")
     resolution = 2000 / 2048
     one = cli("frf", paper, "--axis", "x", "--params", tmp_path / "p.yaml", "--json").json["axes"]["x"]["frf"]
@@ -251,7 +251,7 @@ def test_parameter_files_settings_and_spans_change_the_answer(paper: Path, tmp_p
 
 
 def test_other_units_are_carried_into_every_answer(tmp_path: Path) -> None:
-    """A current and an angle stay what they are; mV and um become V and m, and it is said."""
+    """A current and an angle keep their units; mV and um are converted to V and m, with a note."""
     path = npz(tmp_path / "a.npz", u_unit="A", y_unit="rad")
     assert "rad/s/A" in cli("fit", path, *RIGID).out and "dB (rad/A)" in cli("frf", path).out
     said = cli("fit", npz(tmp_path / "b.npz", u_unit="mV", y_unit="um"), *RIGID)
@@ -259,7 +259,7 @@ def test_other_units_are_carried_into_every_answer(tmp_path: Path) -> None:
 
 
 def test_samples_that_are_missing_are_stepped_over(tmp_path: Path) -> None:
-    """One NaN costs the windows around it and nothing else; a jump of time is a gap."""
+    """One NaN removes only the windows around it; a jump of time is a gap."""
     whole = cli("fit", npz(tmp_path / "a.npz"), *RIGID, "--json").json["axes"]["x"]
     for name, changes in (("u", {"u": lambda d: with_one(d["u"], 9000, np.nan)}), ("t", {"t": lambda d: d["t"] + 1e3 * (d["t"] > 15)})):
         found = cli("fit", npz(tmp_path / f"{name}.npz", **changes), *RIGID, "--json").json["axes"]["x"]
@@ -269,7 +269,7 @@ def test_samples_that_are_missing_are_stepped_over(tmp_path: Path) -> None:
 
 
 def test_a_frozen_or_leaping_encoder_does_not_spoil_the_answer(tmp_path: Path) -> None:
-    """Windows with it are left out and counted, as online; a step of the input after a standstill is no fault."""
+    """Windows with it are left out and counted, as online; a step of the input after rest is no fault."""
     for name, change, words in (
         ("frozen", lambda d: with_one(d["y"], slice(12_000, 13_000), d["y"][12_000]), "the encoder repeated one value"),
         ("leap", lambda d: with_one(d["y"], 12_000, 1.0), "the encoder leapt further"),
@@ -283,7 +283,7 @@ def test_a_frozen_or_leaping_encoder_does_not_spoil_the_answer(tmp_path: Path) -
 
 
 def test_an_output_that_does_not_follow_the_input_is_said(tmp_path: Path) -> None:
-    """Noise against noise: the lines that chance makes coherent are not taken for an answer."""
+    """Noise against noise: lines that are coherent by chance do not give an answer."""
     path = npz(tmp_path / "r.npz", y=lambda d: np.random.default_rng(9).normal(size=30_000))
     said = cli("frf", path)
     assert said.code == 0 and "the output hardly follows the input" in said.err
@@ -292,7 +292,7 @@ def test_an_output_that_does_not_follow_the_input_is_said(tmp_path: Path) -> Non
 
 
 def test_a_recording_with_one_window_has_no_uncertainty_and_no_fit(tmp_path: Path) -> None:
-    """Where somebody asks for such a window the response is shown, and it is said that no line can be trusted; a fit is refused."""
+    """With such a window the response is shown with the note that no line can be trusted; a fit is refused."""
     path, window = npz(tmp_path / "r.npz", rows=4097), ("--set", "length=4095")
     said = cli("frf", path, *window)
     assert said.code == 0 and "0 of 1226 lines trusted" in said.out and "no uncertainty" in said.err
@@ -301,7 +301,7 @@ def test_a_recording_with_one_window_has_no_uncertainty_and_no_fit(tmp_path: Pat
 
 
 def test_a_short_recording_that_starts_between_two_windows_is_used(tmp_path: Path) -> None:
-    """Windows lie on a grid of the counter; where none of it fits in, they start with the data."""
+    """Windows lie on a grid of the counter; if none of it fits into the data, they start with the data."""
     t, u, y = rigid(8000).values()
     late = Recording(1000.0, ("x",), np.arange(1000, 9000), t, u[:, None], y[:, None])
     save(late, tmp_path / "bag")
@@ -310,7 +310,7 @@ def test_a_short_recording_that_starts_between_two_windows_is_used(tmp_path: Pat
 
 
 def test_an_axis_without_an_answer_does_not_take_the_others_with_it(paper: Path, model: Path, tmp_path: Path) -> None:
-    """A standing axis: what the others have is told, and why this one has nothing; alone, it is a refusal."""
+    """An axis at rest: the others get their results, and this one a reason; alone, it is an error."""
     recording = load(paper)
     position = recording.position.copy()
     position[:, 0] = 0.0
@@ -325,7 +325,7 @@ def test_an_axis_without_an_answer_does_not_take_the_others_with_it(paper: Path,
 
 
 def test_replay_names_the_units_of_its_bag(tmp_path: Path) -> None:
-    """A bag of a current and an angle, and joint states with an effort: no figure claims to be in metres or volts."""
+    """A bag of a current and an angle, and joint states with an effort: no number is given in metres or volts."""
     t, u, y = rigid(9000).values()
     save(Recording(1000.0, ("x",), np.arange(9000), t, u[:, None], y[:, None], input_unit="A", output_unit="rad"), tmp_path / "bag")
     said = cli("replay", tmp_path / "bag", *RIGID, "--set", "length=1024")
@@ -338,7 +338,7 @@ def test_replay_names_the_units_of_its_bag(tmp_path: Path) -> None:
 
 
 def test_an_output_that_is_the_input_is_answered_without_noise_on_the_terminal(tmp_path: Path) -> None:
-    """A made-up signal without any noise has no scatter; any order, window and method answers or refuses in one line."""
+    """A synthetic signal without noise has no scatter; any order, window and method gives an answer or one line."""
     path = npz(tmp_path / "same.npz", rows=10_000, y=lambda d: d["u"])
     for orders in ((0, 1), (3, 6), (8, 9)):
         for method in ("best", "iwls", "lls", "nllsfdi"):
@@ -351,7 +351,7 @@ def test_an_output_that_is_the_input_is_answered_without_noise_on_the_terminal(t
 
 @pytest.mark.parametrize("strange", ["in random order", "against time"])
 def test_compare_says_that_input_and_output_do_not_belong_together(strange: str, tmp_path: Path) -> None:
-    """A model that leaves most of the motion is no model; text and JSON say so before any figure."""
+    """A model that explains little of the motion is no model; text and JSON say so before any number."""
     position = rigid(30_000)["y"]
     own = np.random.default_rng(2).permutation(position) if strange == "in random order" else position[::-1]
     file = npz(tmp_path / "rec.npz", y=own)

@@ -1,4 +1,4 @@
-"""From any file to an answer: what is in it, which column is what, and several recordings at once."""
+"""From any file to an answer: its content, the role of each column, and several recordings at once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from xy_sysid.imports.several import joined, read_all
 
 
 def test_columns_says_what_is_in_a_table_and_what_it_is_taken_for(tmp_path: Path) -> None:
-    """Name, unit, rows, range, what looks like a clock, the role; how it reads; the same as JSON."""
+    """Name, unit, rows, range, likely clock, role; how the file is read; the same as JSON."""
     path = csv_of(tmp_path, {"Time": T, "state": ["on"] * len(T), "Motor Voltage (V)": U, "Pos [mm]": 1e3 * Y})
     said = cli("columns", path)
     assert (
@@ -62,7 +62,7 @@ def test_columns_of_bags_and_arrays(tmp_path: Path, kind: str) -> None:
 
 @pytest.mark.parametrize("command", ["frf", "fit", "compare", "diagnose", "validate", "refine", "study", "report"])
 def test_every_offline_command_has_the_same_options_of_reading(command: str) -> None:
-    """--map, --unit, --scale, --rate, --axis, --topic, --effort and --span, said once."""
+    """--map, --unit, --scale, --rate, --axis, --topic, --effort and --span are the same everywhere."""
     text = cli(command, "--help").out
     for option in ("--map WHAT=COLUMN", "--unit WHAT=UNIT", "--scale WHAT=FACTOR", "--rate HZ", "--axis", "--topic", "--effort", "--span"):
         assert option in text, option
@@ -80,12 +80,12 @@ def test_every_offline_command_has_the_same_options_of_reading(command: str) -> 
     ],
 )
 def test_a_wrong_option_of_reading_is_one_line(tmp_path: Path, options: tuple[str, ...], words: str) -> None:
-    """What was given, what is allowed, the next act."""
+    """The given value, the allowed values, the next action."""
     assert words in refused("frf", npz(tmp_path / "a.npz", rows=600), *options)
 
 
 def test_units_and_scales_hold_for_bags_too(tmp_path: Path) -> None:
-    """A bag's topics name no unit: --unit and --scale do; it has no columns to map."""
+    """Topics of a bag have no unit: --unit and --scale give it; there are no columns to map."""
     bag = a_bag(tmp_path / "bag", both(range(0, 400, 20)))
     plain, turned = load(bag), load(bag, units={"output": "deg"}, scales={"input": 2.0})
     assert (turned.output_unit, turned.input_unit) == ("rad", "V")
@@ -112,7 +112,7 @@ def test_several_recordings_are_read_as_one_with_gaps_between(tmp_path: Path) ->
 
 
 def test_notes_of_several_recordings_say_which(tmp_path: Path) -> None:
-    """Each note begins with its file; what only some have is left out, and said."""
+    """Each note begins with its file; axes that only some files have are left out, with a note."""
     whole = npz(tmp_path / "a.npz", rows=600)
     table = csv_of(tmp_path, {"time": T, "x_voltage": U, "z_voltage": U, "x_position[mm]": 1e3 * Y, "z_position[mm]": Y})
     first, second = read_all([whole, table], Reading())

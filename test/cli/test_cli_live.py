@@ -1,4 +1,4 @@
-"""demo, run and record over real DDS, each in a domain of its own: what they answer, and that Ctrl-C leaves nothing behind."""
+"""demo, run and record over real DDS, each in its own domain: their answers, and no remains after Ctrl-C."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Command:
         return self.process.returncode, out.decode(), self.log.read_text(errors="replace")
 
     def left_over(self) -> list[str]:
-        """Processes with the mark that still live."""
+        """Processes with the mark that are still running."""
         return list(self.living().values())
 
     def living(self) -> dict[int, str]:
@@ -63,13 +63,13 @@ class Command:
                 if f"XY_SYSID_TEST_MARK={self.mark}".encode() in (folder / "environ").read_bytes():
                     found[int(folder.name)] = (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode()
             except OSError:
-                continue  # it has just ended, or is somebody else's
+                continue  # it has just ended, or belongs to another user
         return found
 
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., Command]]:
-    """Start a command; whatever it left is ended after the test."""
+    """Start a command; its remaining processes are ended after the test."""
     started: list[Command] = []
 
     def make(*arguments: object) -> Command:
@@ -98,7 +98,7 @@ def test_the_demo_identifies_both_axes_live(start: Callable[..., Command]) -> No
 
 
 def test_ctrl_c_ends_the_demo_cleanly(start: Callable[..., Command]) -> None:
-    """In the middle of a long demo: 130, one document of what is known so far, no process left."""
+    """During a long demo: 130, one document of the results so far, no process left."""
     command = start("demo", "--seconds", 3600, "--speed", 4, "--json")
     assert command.heard("relative error"), command.end()
     assert len(command.left_over()) == 7  # the command, four nodes, and the process in which the diagnoser calculates, with Python's tracker
@@ -124,9 +124,9 @@ def test_run_starts_what_a_file_names_and_a_signal_ends_it(
 
 
 def test_the_first_run_says_what_it_finds_before_it_goes_on(start: Callable[..., Command], tmp_path: Path) -> None:
-    """run --first on the simulated table in real time: small pushes, gain and delay of each axis measured, machine at rest, no process left."""
+    """run --first on the simulated table in real time: small steps, gain and delay of each axis measured, machine at rest, no process left."""
     (tmp_path / "run.yaml").write_text(FIRST_RUN)
-    for _ in range(3):  # a computer that stands still for a second stops the drive or loses messages, and the run says so rather than a figure
+    for _ in range(3):  # a computer that stalls for a second stops the drive or loses messages, and the run reports this instead of a number
         command = start("run", "--first", "--params", tmp_path / "run.yaml", "--json")
         code, out, err = command.end(180)
         if not ("without all its messages" in err or "the excitation stopped: no position" in err):
@@ -142,7 +142,7 @@ def test_the_first_run_says_what_it_finds_before_it_goes_on(start: Callable[...,
 
 
 def test_a_first_run_whose_machine_falls_silent_says_why_the_drive_stopped(start: Callable[..., Command], tmp_path: Path) -> None:
-    """Half of a push is not judged: what the excitation said is the problem, not what the rest of the samples looks like."""
+    """Half of a step is not judged: the problem is what the excitation reported, not the rest of the samples."""
     (tmp_path / "run.yaml").write_text(FIRST_RUN)
     command = start("run", "--first", "--params", tmp_path / "run.yaml", "--json")
     assert command.heard("first run: x at 0.05 V")
@@ -157,7 +157,7 @@ def test_a_first_run_whose_machine_falls_silent_says_why_the_drive_stopped(start
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_recording_as_a_whole_bag(start: Callable[..., Command], tmp_path: Path, number: signal.Signals) -> None:
-    """For record, Ctrl-C or SIGTERM is the usual end: 0, and what is in the bag."""
+    """For record, Ctrl-C or SIGTERM is the normal end: 0, and the content of the bag."""
     command = start("record", tmp_path / "bag", "--json")
     assert command.heard("recording to")
     command.process.send_signal(number)
@@ -184,7 +184,7 @@ def test_a_wrong_use_of_a_live_command_is_one_line(arguments: tuple[str, ...], w
 
 @pytest.mark.parametrize("domain", ["abc", "500", "-3", "1.5"])
 def test_a_wrong_domain_is_one_line(domain: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """ROS itself would say it in a page."""
+    """The message of ROS itself would be a page long."""
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
     for arguments in (("demo",), ("run",), ("record", tmp_path / "out")):
         assert "ROS_DOMAIN_ID" in refused(*arguments)

@@ -1,4 +1,4 @@
-"""xy-sysid next: which experiment settles what the recordings leave open?"""
+"""xy-sysid next: the experiment that distinguishes the effects that the recordings do not."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LAG = next(pair for pair in PAIRS if "amplifier_lag" in pair.sets[1])
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording in a narrow band, in which lag and delay look the same."""
+    """A recording in a narrow band, in which lag and delay cannot be distinguished."""
     voltage, position = first_recording(LAG, machine(LAG, 1, 1), 1)
     place = tmp_path_factory.mktemp("next") / "narrow.npz"
     np.savez(place, fs=2000.0, u=voltage[:, None], y=position[:, None], axes=np.array(["x"]))
@@ -33,7 +33,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_it_says_what_to_run_and_what_to_expect_and_writes_the_file(recording: Path, tmp_path: Path) -> None:
-    """A sentence with the seconds and the probability, a file that the excitation node loads, and a trajectory for a robot that takes no voltage."""
+    """A sentence with the seconds and the probability, a file for the excitation node, and a trajectory for a robot without voltage input."""
     out, motion = tmp_path / "next.yaml", tmp_path / "motion.yaml"
     sets = ("--between", "rigid", "--between", "amplifier_lag")
     said = cli("next", recording, *sets, "--voltage", 5, "--travel=-140:140", "-o", out, "--trajectory", motion)
@@ -65,12 +65,12 @@ def test_it_says_what_to_run_and_what_to_expect_and_writes_the_file(recording: P
     ],
 )
 def test_wrong_use_is_refused_in_one_line(recording: Path, options: tuple[str, ...], words: str) -> None:
-    """What is wrong, and what to write."""
+    """The error, and the correct input."""
     assert words in refused("next", recording, *options)
 
 
 def test_the_trajectory_for_a_parameter_is_that_of_the_diagnosed_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And not of a rigid one: with friction the same voltage moves the axis less far."""
+    """The motion is not that of a rigid axis: with friction the same voltage moves the axis less far."""
     place, models = tmp_path / "friction.npz", list[AxisModel]()
     one = recorded("coulomb_friction=0.4", seconds=10.0)
     np.savez(place, fs=one.sampling_rate, u=one.voltage, y=one.position, axes=np.array(one.axes))
@@ -89,7 +89,7 @@ def test_the_trajectory_for_a_parameter_is_that_of_the_diagnosed_model(tmp_path:
 
 
 def test_a_first_experiment_is_in_the_units_of_what_the_run_file_drives(tmp_path: Path) -> None:
-    """Effort and angle of a joint, without --unit; and the file is one that this excitation takes."""
+    """Effort and angle of a joint, without --unit; the excitation accepts the file."""
     run_file, out = tmp_path / "run.yaml", tmp_path / "next.yaml"
     joint = {"x.limit": 2.0, "x.travel_min": -1.5, "x.travel_max": 1.5, "unit": "rad", "output": "commands", "interface": "effort", "rate": 500.0}
     run_file.write_text(yaml.safe_dump({"excitation": {"ros__parameters": joint}}))
@@ -117,7 +117,7 @@ def test_without_a_recording_it_asks_for_one() -> None:
 
 
 def test_every_sentence_is_in_the_units_of_the_recording(recording: Path, tmp_path: Path) -> None:
-    """An axis that is driven in A and turns: its own units stand in the answer, in the file and in a refusal, and those of a table nowhere."""
+    """A rotary axis with an input in A: its own units are in the answer, in the file and in an error, those of a table nowhere."""
     out = tmp_path / "next.yaml"
     read = (recording, "--unit", "input=A", "--unit", "output=rad")
     said = cli("next", *read, "--between", "rigid", "--between", "amplifier_lag", "--voltage", 5, "--travel=-0.14:0.14", "-o", out)

@@ -1,4 +1,4 @@
-"""What a reader noted is told by every command: on stderr for people, in the document for a program."""
+"""Every command gives the notes of the reader: on stderr for people, in the document for programs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ READING: dict[str, tuple[str, ...]] = {
 
 
 def _beside(values: FloatArray) -> FloatArray:
-    """A second axis, which does later what the first does."""
+    """A second axis, which repeats the motion of the first later."""
     return np.column_stack((values, np.roll(values, 1000)))
 
 
@@ -52,7 +52,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.mark.parametrize("name", READING)
 def test_the_document_of_a_command_has_the_notes_of_the_reader(name: str, files: dict[str, str], tmp_path: Path) -> None:
-    """Once, and without another that says that there is no time."""
+    """Once, and without a second note that there is no time."""
     places = {**files, "OUT": str(tmp_path / "out")}
     words = [places.get(word, word) for word in READING[name]]
     said = cli(*words, "--rate", "1000", "--json")
@@ -63,7 +63,7 @@ def test_the_document_of_a_command_has_the_notes_of_the_reader(name: str, files:
 
 
 def test_every_command_that_reads_a_recording_is_looked_at_here() -> None:
-    """A new one goes into the table. The page shows notes itself, and a fleet has a row for each recording."""
+    """A new command must be added to the table. The page shows notes itself, and a fleet has a row for each recording."""
     taking = {
         str(command.name)
         for command in app.registered_commands

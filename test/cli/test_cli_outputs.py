@@ -1,4 +1,4 @@
-"""No command replaces a file unasked, directly or through a link."""
+"""No command replaces a file without --force, directly or through a link."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ FILES: dict[str, tuple[str, ...]] = {
     "trajectory": ("trajectory", "OUT", "--joint", "pan", "--position", "1", "--speed", "1", "--acceleration", "10", "--seconds", "12"),
     "next -o": ("next", "--for", "nothing", "--voltage", "5", "--travel=-100:100", "-o", "OUT"),
 }
-REFUSED_AT_ONCE: dict[str, tuple[str, ...]] = {  # before the work, which is not done here
+REFUSED_AT_ONCE: dict[str, tuple[str, ...]] = {  # the error comes before the work
     "trend -o": ("trend", "NONE", "-o", "OUT"),
     "fleet --one -o": ("fleet", "--one", "NONE", "-o", "OUT"),
 }
@@ -58,7 +58,7 @@ def words(row: tuple[str, ...], rec: Path, out: Path) -> list[str]:
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_is_replaced_with_force_only(name: str, rec: Path, tmp_path: Path) -> None:
-    """Refused before any work is done, in a line that says --force; with it the file is new."""
+    """An error before any work, in a line that names --force; with it the file is replaced."""
     out = tmp_path / "out"
     out.write_bytes(OLD)
     assert "add --force to replace it" in refused(*words(FILES[name], rec, out))
@@ -69,7 +69,7 @@ def test_a_file_is_replaced_with_force_only(name: str, rec: Path, tmp_path: Path
 
 @pytest.mark.parametrize("name", [*FILES, *REFUSED_AT_ONCE])
 def test_a_link_is_followed_with_force_only(name: str, rec: Path, tmp_path: Path) -> None:
-    """The line says where the link leads, be there a file or none yet."""
+    """The error names the target of the link, whether it exists or not."""
     other, link = tmp_path / "elsewhere" / "precious", tmp_path / "out"
     other.parent.mkdir()
     link.symlink_to(other)
@@ -80,7 +80,7 @@ def test_a_link_is_followed_with_force_only(name: str, rec: Path, tmp_path: Path
 
 
 def test_the_files_of_a_model_in_use_do_not_follow_links(rec: Path, tmp_path: Path) -> None:
-    """Its folder holds many: each name is looked at before any is written."""
+    """The folder holds many files: each name is checked before any is written."""
     model, out = tmp_path / "model.yaml", tmp_path / "out"
     assert cli("refine", rec, "--add", "coulomb_friction", "--model", model).code == 0
     assert cli("use", model, "--limit", "5", "--to", "c", "-o", out).code == 0
@@ -93,7 +93,7 @@ def test_the_files_of_a_model_in_use_do_not_follow_links(rec: Path, tmp_path: Pa
 
 
 def test_every_option_that_writes_a_file_is_looked_at_here() -> None:
-    """A new one goes into these tables: each command whose help says that an option or argument writes something."""
+    """A new command must be added to these tables if its help says that an option or argument writes a file."""
     writing = {
         f"{command.name} {parameter.name}"
         for command in app.registered_commands
@@ -120,7 +120,7 @@ def test_every_option_that_writes_a_file_is_looked_at_here() -> None:
 
 @pytest.mark.parametrize("name", BAGS)
 def test_a_recording_never_replaces_anything(name: str, rec: Path, tmp_path: Path) -> None:
-    """Neither a file nor a link that leads nowhere yet."""
+    """Neither a file nor a broken link."""
     given = words(BAGS[name], rec, tmp_path / "out")
     place = Path(next(word for word in given if word.startswith(str(tmp_path))))
     place.symlink_to(tmp_path / "elsewhere")
@@ -129,7 +129,7 @@ def test_a_recording_never_replaces_anything(name: str, rec: Path, tmp_path: Pat
 
 
 def test_pictures_are_replaced_with_force_only_and_an_axis_leads_into_no_other_folder(tmp_path: Path) -> None:
-    """Those of the axes that are drawn; other files of the folder matter to nobody. The name of an axis comes from the recording."""
+    """Only files of the drawn axes are checked, not others in the folder. The name of an axis comes from the recording."""
     t, u, y = rigid(12_000).values()
     axis, out = "../../left/wrist", tmp_path / "a" / "b" / "pictures"
     save(Recording(1000.0, (axis,), np.arange(12_000), t, u[:, None], y[:, None]), tmp_path / "bag")
@@ -151,5 +151,5 @@ def test_pictures_are_replaced_with_force_only_and_an_axis_leads_into_no_other_f
 
 
 def test_what_goes_into_a_pipe_replaces_nothing(rec: Path) -> None:
-    """A device is there always, and takes whatever is written to it."""
+    """A device always exists, and accepts any output."""
     assert cli("frf", rec, "--csv", "/dev/null").code == 0

@@ -80,7 +80,7 @@ def test_a_command_that_is_not_there_is_named_with_the_nearest() -> None:
 )
 @pytest.mark.parametrize("command", ["fit", "frf"])
 def test_a_wrong_option_is_one_line(command: str, options: str, words: str, good: Path) -> None:
-    """The value, what is allowed, and the next act; an answer comes at once, however large the number."""
+    """The value, the allowed values, and the next action, at once, even for huge numbers."""
     assert words in refused(command, good, *options.split(" "))
 
 
@@ -100,7 +100,7 @@ def test_a_wrong_option_is_one_line(command: str, options: str, words: str, good
     ],
 )
 def test_a_wrong_option_of_fit_is_one_line(options: str, words: str, good: Path) -> None:
-    """Where the answer is to be written is looked at before the work is done."""
+    """The output path is checked before any work."""
     assert words in refused("fit", good, *options.split(" "))
     assert "Make /no/such first" in refused("frf", good, "--csv", "/no/such/x.csv")
 
@@ -132,12 +132,12 @@ def test_a_wrong_option_of_fit_is_one_line(options: str, words: str, good: Path)
     ],
 )
 def test_data_that_carry_no_answer_are_one_line(changes: dict[str, Any], words: str, tmp_path: Path) -> None:
-    """Nothing that moves, too little of it, or numbers that cannot be: the axis and the reason are named."""
+    """No motion, too few data, or impossible numbers: the error names the axis and the reason."""
     assert words in refused("frf", npz(tmp_path / "r.npz", **changes))
 
 
 def test_a_file_that_is_no_recording_is_one_line(tmp_path: Path) -> None:
-    """Missing, empty, garbage, a folder without a bag: each says so."""
+    """Missing, empty, garbage, a folder without a bag: each error says so."""
     garbage = np.random.default_rng(1).bytes(2000)
     assert "cannot be read" in refused("fit", tmp_path / "missing.npz")
     assert "not a bag" in refused("fit", tmp_path)
@@ -161,7 +161,7 @@ def test_a_file_that_is_no_recording_is_one_line(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_parameter_file_is_one_line(text: str, words: str, good: Path, tmp_path: Path) -> None:
-    """What is wrong in the file, and where."""
+    """The error in the file, and its place."""
     (tmp_path / "p.yaml").write_text(text)
     assert words in refused("fit", good, "--params", tmp_path / "p.yaml")
 
@@ -194,7 +194,7 @@ def test_a_wrong_parameter_file_is_one_line(text: str, words: str, good: Path, t
     ],
 )
 def test_a_wrong_model_file_is_one_line(change: dict[str, Any], words: str, good: Path, model: Path, tmp_path: Path) -> None:
-    """Bad numbers, other units and another rate are refused, and never compared."""
+    """Bad numbers, other units and another rate give an error and no comparison."""
     document = yaml.safe_load(model.read_text())
     document["axes"]["x"]["transfer_function"] |= change
     (tmp_path / "m.yaml").write_text(yaml.safe_dump(document))
@@ -202,7 +202,7 @@ def test_a_wrong_model_file_is_one_line(change: dict[str, Any], words: str, good
 
 
 def test_a_model_file_is_replaced_only_by_force(good: Path, tmp_path: Path) -> None:
-    """Before any work is done; with --force it is."""
+    """An error before any work; with --force the file is replaced."""
     path = tmp_path / "mine.yaml"
     path.write_text("of somebody else")
     said = refused("fit", good, *RIGID, "--model", path)
@@ -252,7 +252,7 @@ def test_a_wrong_simulation_is_one_line(options: str, words: str, tmp_path: Path
 
 
 def test_an_output_that_cannot_be_is_refused_before_the_work(tmp_path: Path) -> None:
-    """What is there stays as it is; folders are not made by accident."""
+    """Existing files are not changed; no folders are created by accident."""
     (tmp_path / "there").write_text("mine")
     assert "a name that is not there yet" in refused("simulate", tmp_path / "there")
     assert "a name that is not there yet" in refused("simulate", tmp_path)
@@ -276,12 +276,12 @@ def test_a_wrong_replay_is_one_line_and_leaves_nothing(bag: Path, tmp_path: Path
 
 
 def test_a_whole_file_given_as_a_value_does_not_flood_the_terminal(tmp_path: Path) -> None:
-    """A refusal is one line that can be read."""
+    """An error is one readable line."""
     (tmp_path / "machine.yaml").write_text("words " * 2000)
     assert len(refused("simulate", tmp_path / "out", "--machine", tmp_path / "machine.yaml")) < 900
 
 
 def test_files_that_cannot_be_written_at_the_last_moment_are_one_line(good: Path) -> None:
-    """The system's own word is passed on."""
+    """The message of the system is passed on."""
     said = cli("frf", good, "--csv", "/dev/full")
     assert said.code == 2 and said.err.count("\n") == 1 and "No space left" in said.err

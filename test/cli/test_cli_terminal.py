@@ -1,4 +1,4 @@
-"""Nothing that a file or another program says steers the terminal of whoever reads it."""
+"""No text from a file or another program can control the user's terminal."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ HOSTILE = f"{TITLE}{RED}{RING}{BACK}\x7f{CSI}{TURNED}"
 
 
 def steers(text: str) -> set[str]:
-    """The characters of a text that a terminal obeys instead of showing them."""
+    """The control characters of a text."""
     return {sign for sign in text if sign != "\n" and unicodedata.category(sign) in ("Cc", "Cf", "Zl", "Zp")}
 
 
 def shown(said: Said) -> str:
-    """All that was said, which holds nothing that steers."""
+    """All output, without control characters."""
     assert not steers(said.out + said.err), repr(said.out + said.err)
     return said.out + said.err
 
 
 @pytest.fixture(scope="module")
 def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """30 s of a rigid axis in a table whose columns are named to take over a terminal."""
+    """30 s of a rigid axis in a table with control characters in the names of its columns."""
     path = tmp_path_factory.mktemp("sheet") / "sheet.csv"
     names = ",".join(["time", f"u{HOSTILE}", f"y{HOSTILE} [m]", f"note{HOSTILE}"])
     rows = np.column_stack((*rigid(30_000).values(), np.ones(30_000)))
@@ -39,7 +39,7 @@ def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """15 s of a bag whose axis is named so."""
+    """15 s of a bag with such a name of its axis."""
     path = tmp_path_factory.mktemp("bag") / "bag"
     t, u, y = rigid(15_000).values()
     save(Recording(1000.0, (f"x{HOSTILE}",), np.arange(15_000), t, u[:, None], y[:, None]), path)
@@ -59,25 +59,25 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ids=" ".join,
 )
 def test_the_name_of_a_column_cannot_steer_the_terminal(sheet: Path, options: tuple[str, ...]) -> None:
-    """In tables, notes, sentences and refusals it is shown, character by character."""
+    """Tables, notes, sentences and errors show each character visibly."""
     assert shown(cli(options[0], sheet, *options[1:]))
 
 
 def test_the_name_of_an_axis_in_a_bag_cannot_steer_the_terminal(bag: Path) -> None:
-    """A recording from the network, too: each answer names the axis, and shows what is in the name."""
+    """Also for a recording from the network: each answer shows the name of the axis visibly."""
     for command in (("columns", bag), ("frf", bag), ("fit", bag, *RIGID), ("replay", bag, *RIGID), ("replay", bag, "--axis", "none")):
         assert "␛]0;mine" in shown(cli(*command)), command
 
 
 def test_the_name_of_a_file_cannot_steer_the_terminal(tmp_path: Path) -> None:
-    """Names of files that are there and of those that are not."""
+    """Names of existing and of missing files."""
     path = npz(tmp_path / f"a{HOSTILE}.npz", 8_000)
     assert "␛]0;mine" in shown(cli("columns", path))
     assert "␛]0;mine" in shown(cli("fit", path.with_name(f"none{HOSTILE}.npz")))
 
 
 def test_a_model_file_cannot_steer_the_terminal(tmp_path: Path) -> None:
-    """Its words come back in refusals."""
+    """Its text is repeated in errors."""
     model = tmp_path / "model.yaml"
     model.write_text('format: "xy_sysid \\e[31m"\naxes: {"x\\e[31m": {}}\n', encoding="utf-8")
     good = npz(tmp_path / "good.npz", 8_000)

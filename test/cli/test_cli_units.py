@@ -1,4 +1,4 @@
-"""A joint in rad, driven by N m: no answer of any command names a unit of the XY table."""
+"""A joint in rad with an input in N m: no answer of any command contains a unit of the XY table."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ COMMANDS: dict[str, tuple[Any, ...]] = {
 
 
 def wrong(text: str) -> list[str]:
-    """Each place where a unit of the table stands, with what is around it."""
+    """Each occurrence of a unit of the table, with its context."""
     rest = re.sub(r"\bkg m\^2", "inertia", re.sub(r"\bN[ \u00a0]m\b", "torque", text))
     return [rest[max(found.start() - 40, 0) : found.end() + 20] for found in LENGTHS.finditer(rest)]
 
@@ -67,7 +67,7 @@ def named(folder: Path, arguments: tuple[Any, ...]) -> list[Any]:
 
 @pytest.mark.parametrize("arguments", COMMANDS.values(), ids=COMMANDS.keys())
 def test_no_command_names_a_unit_that_is_not_the_joints(folder: Path, arguments: tuple[Any, ...]) -> None:
-    """As words and as a document; and the joint's own unit stands in both."""
+    """As text and as a document; both contain the joint's own unit."""
     said = cli(*named(folder, arguments))
     document = cli(*named(folder, arguments), "--json")
     assert said.code in (0, 1) and document.code == said.code, said.err
@@ -77,7 +77,7 @@ def test_no_command_names_a_unit_that_is_not_the_joints(folder: Path, arguments:
 
 
 def test_models_in_files_keep_the_units(folder: Path) -> None:
-    """Of both kinds; and who reads them knows them again."""
+    """Of both kinds, and again after loading."""
     from xy_sysid import load_model
 
     for name in ("linear.yaml", "axis.yaml"):
@@ -88,7 +88,7 @@ def test_models_in_files_keep_the_units(folder: Path) -> None:
 
 @pytest.mark.parametrize("command", ["report", "study"])
 def test_no_page_names_a_unit_that_is_not_the_joints(folder: Path, command: str) -> None:
-    """In what people read, and in the titles of the axes of its figures."""
+    """In its text, and in the titles of the axes of its figures."""
     out = folder / f"{command}.html"
     assert cli(command, folder / "joint.csv", *SAMPLES, "-o", out).code == 0
     page = out.read_text(encoding="utf-8")
@@ -97,13 +97,13 @@ def test_no_page_names_a_unit_that_is_not_the_joints(folder: Path, command: str)
 
 
 def test_no_figure_names_a_unit_that_is_not_the_joints(folder: Path) -> None:
-    """The numbers of every picture, with their heads."""
+    """The numbers of every figure, with their column heads."""
     assert cli("figures", folder / "joint.csv", "-o", folder / "figures", "--kind", "csv").code == 0
     heads = {path.name: path.read_text(encoding="utf-8").splitlines()[0] for path in sorted((folder / "figures").glob("*.csv"))}
     assert len(heads) > 5 and {name: wrong(head) for name, head in heads.items() if wrong(head)} == {}
 
 
 def test_a_unit_that_is_wrong_would_be_seen() -> None:
-    """The pattern finds what this file is about, and leaves what is right."""
+    """The pattern finds units of the table, and accepts correct ones."""
     assert all(wrong(text) for text in ("3 mm/s", "0.2 V", "m/s/V", "dB re 1 mm/V", "5 um", "2 N", "in volts", "micrometre loops"))
     assert not any(wrong(text) for text in ("3 mrad/s", "0.2 N m", "rad/s/(N m)", "2.3 ms", "12 Hz", "N m/rad"))

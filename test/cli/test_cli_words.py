@@ -1,4 +1,4 @@
-"""What commands say to people: lines that fit, nothing twice, figures worth their interval, words that people type."""
+"""The text of commands: lines that fit, nothing twice, significant digits by the interval, option names as typed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def dry(tmp_path_factory: pytest.TempPathFactory) -> Path:
     "words", [("frf",), ("fit",), ("compare",), ("diagnose", "--axis", "x"), ("refine", "--axis", "x", "--auto"), ("columns",), ("effects",)]
 )
 def test_lines_fit_in_80_columns(dry: Path, words: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sentences are broken between words and tables into cells; a file's own long path alone may stand out."""
+    """Sentences are wrapped between words and tables in cells; only the long path of a file may exceed the width."""
     for console in (people, aside):
         monkeypatch.setattr(console, "width", 80)
     command, *options = words
@@ -34,13 +34,13 @@ def test_lines_fit_in_80_columns(dry: Path, words: tuple[str, ...], monkeypatch:
 
 
 def test_compare_says_each_place_once(dry: Path) -> None:
-    """The places stand in the table, not in the sentence above it, too."""
+    """The places are in the table, and not repeated in the sentence above it."""
     said = cli("compare", dry, "--axis", "x").out
     assert said.count("times the noise floor") == 1 and " ".join(said.split()).count("above twice the floor") == 1
 
 
 def test_candidates_are_ranked_by_what_each_leaves(dry: Path) -> None:
-    """The named one leads among those that leave as little."""
+    """The named effect is first among those with an equal error."""
     lines = cli("diagnose", dry, "--axis", "x").out.splitlines()
     begin = next(k for k, line in enumerate(lines) if line.startswith("effect "))
     rows = [line.split() for line in lines[begin + 1 :]]
@@ -50,7 +50,7 @@ def test_candidates_are_ranked_by_what_each_leaves(dry: Path) -> None:
 
 
 def test_what_is_judged_one_sample_ahead_takes_no_part_of_a_simulations_error(tmp_path: Path) -> None:
-    """Its column has a dash, not 0 % beside a sentence that says nearly all."""
+    """Its column has a dash, not 0 %, which would contradict the sentence."""
     made = tmp_path / "gap.npz"
     assert cli("simulate", made, "--machine", "rigid.yaml", "--effect", "backlash", "--duration", "8").code == 0
     said = cli("diagnose", made, "--axis", "x").out
@@ -59,7 +59,7 @@ def test_what_is_judged_one_sample_ahead_takes_no_part_of_a_simulations_error(tm
 
 
 def test_an_interval_shows_what_it_is_worth() -> None:
-    """Never twice the same number, never what cannot be: a delay or a friction below zero."""
+    """Two ends are never the same number, and never impossible: a delay or a friction below zero."""
     assert estimate("delay", (0.0016667, 0.00166665, 0.00166675), "s") == ("delay", "1.666700", "1.666650 .. 1.666750", "ms")
     assert estimate("delay", (0.0, -0.153, 0.153), "s")[2].startswith("0 .. 15")
     assert possible("coulomb_friction.coulomb", (0.1, -0.2, 0.4)) == (0.1, 0.0, 0.4)

@@ -1,4 +1,4 @@
-"""Files that somebody names and that are none, or far too long: one line at once, whichever option names them."""
+"""Named paths that are not regular files, or are far too long: one line at once, for every option."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from xy_sysid.files.state import load_state
 from xy_sysid.fleets.causes import causes
 from xy_sysid.settings import ExcitationSettings
 
-QUICK = 2.0  # s, for a refusal
-DOUBLING = [("", "n0"), *((f"n{k}", f"n{k + 1}") for k in range(30))]  # each list holds the one before twice
+QUICK = 2.0  # s, limit for an error
+DOUBLING = [("", "n0"), *((f"n{k}", f"n{k + 1}") for k in range(30))]  # each list contains the previous one twice
 
 
 def doubling() -> str:
-    """YAML of a few lines that is a thousand million values once it is read."""
+    """YAML of a few lines that expands to a thousand million values."""
     return "".join(f"{b}: &{b} [*{a}, *{a}]\n" if a else f"{b}: &{b} [1, 2]\n" for a, b in DOUBLING)
 
 
 @contextmanager
 def little_memory() -> Iterator[None]:
-    """Python and NumPy take no more than a tenth of the gigabyte that such files once took."""
+    """Python and NumPy use at most a tenth of the gigabyte that such files used before."""
     tracemalloc.start()
     try:
         yield
@@ -44,11 +44,11 @@ def little_memory() -> Iterator[None]:
         tracemalloc.stop()
 
 
-ENDLESS = 10.0  # s after which a command is taken to hang
+ENDLESS = 10.0  # s after which a command counts as hanging
 
 
 def at_once(act: Callable[[], Said], seconds: float = ENDLESS) -> Said:
-    """What a command says; fails where it hangs, which leaves its thread behind."""
+    """The output of a command; fails if it hangs, in which case its thread remains."""
     said: list[Said] = []
     thread = threading.Thread(target=lambda: said.append(act()), daemon=True)
     thread.start()
@@ -58,7 +58,7 @@ def at_once(act: Callable[[], Said], seconds: float = ENDLESS) -> Said:
 
 
 def refusal(*words: object, seconds: float = ENDLESS) -> str:
-    """The one line of a command that refuses within its time."""
+    """The one error line of a command within its time."""
     said = at_once(lambda: cli(*words), seconds)
     lines = [line for line in said.err.splitlines() if not line.startswith("note: ")]
     assert said.code == 2 and said.out == "" and len(lines) == 1, said
@@ -66,7 +66,7 @@ def refusal(*words: object, seconds: float = ENDLESS) -> str:
 
 
 def told_at_once(act: Callable[[], object], seconds: float = ENDLESS) -> str:
-    """The one line of a refusal by a function that raises it within its time."""
+    """The one error line of a function that raises it within its time."""
 
     def said() -> Said:
         try:
@@ -93,7 +93,7 @@ def folder(path: Path) -> None:
 
 @contextmanager
 def within(place: Path) -> Iterator[None]:
-    """In a folder: the name of a socket has 107 characters at most."""
+    """Within a folder, because the name of a socket has at most 107 characters."""
     before = Path.cwd()
     os.chdir(place)
     try:
@@ -139,14 +139,14 @@ def rec(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("odd", ODD)
 @pytest.mark.parametrize("what", READS)
 def test_what_is_no_regular_file_is_refused_wherever_one_is_read(what: str, odd: str, rec: Path, tmp_path: Path) -> None:
-    """It may never end: nothing waits for it."""
+    """Reading it may never end: no command waits for it."""
     if (what, odd) in (("a database", "a folder"), ("an mcap", "a folder")):
         pytest.skip("a folder may be a bag")
     words = [
         str(rec) if word == "REC" else word.replace("FILE", str(tmp_path / "odd")).replace("FOLDER", str(tmp_path / "odd")) for word in READS[what]
     ]
     file = next(Path(word) for word in words if word.startswith(str(tmp_path / "odd")))
-    if file.parent != tmp_path:  # of a folder the command is told the folder alone
+    if file.parent != tmp_path:  # for a folder, the command gets only the folder
         file.parent.mkdir()
         words[words.index(str(file))] = str(file.parent)
     ODD[odd](file)
@@ -155,7 +155,7 @@ def test_what_is_no_regular_file_is_refused_wherever_one_is_read(what: str, odd:
 
 @pytest.mark.parametrize("odd", ODD)
 def test_what_is_no_regular_file_is_a_row_with_its_problem_in_a_fleet(odd: str, tmp_path: Path) -> None:
-    """The others of the fleet are analysed all the same."""
+    """The other recordings of the fleet are analysed nevertheless."""
     ODD[odd](tmp_path / "odd.csv")
     said = at_once(lambda: cli("fleet", "--one", tmp_path / "odd.csv"))
     (row,) = said.json["rows"]
@@ -164,7 +164,7 @@ def test_what_is_no_regular_file_is_a_row_with_its_problem_in_a_fleet(odd: str, 
 
 @pytest.mark.parametrize("odd", ODD)
 def test_an_experiment_that_is_no_regular_file_is_refused(odd: str, tmp_path: Path) -> None:
-    """The excitation reads it while it configures; nobody waits for a node that hangs."""
+    """The excitation reads it in configure, and must not hang."""
     ODD[odd](tmp_path / "odd.yaml")
 
     line = told_at_once(lambda: read_experiment(ExcitationSettings(), tmp_path / "odd.yaml"))
@@ -181,7 +181,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize("odd", ODD)
 @pytest.mark.parametrize("name", ["named.db3", "rec.db3-journal", "rec.db3-wal"])
 def test_a_bag_with_a_file_that_is_none_is_refused(name: str, odd: str, good: Path, tmp_path: Path) -> None:
-    """As its metadata names it, or beside the database, where sqlite would open it."""
+    """As named in its metadata, or next to the database, where sqlite would open it."""
     bag = tmp_path / "rec"
     shutil.copytree(good, bag)
     ODD[odd](bag / name)
@@ -206,7 +206,7 @@ def test_a_bag_with_a_file_that_is_none_is_refused(name: str, odd: str, good: Pa
     ids=lambda words: words[0],
 )
 def test_every_command_refuses_a_bag_that_names_a_pipe(words: tuple[str, ...], good: Path, rec: Path, model: str, tmp_path: Path) -> None:
-    """None of them waits for what nobody writes."""
+    """None of them waits for a pipe without a writer."""
     bag, known = tmp_path / "rec", tmp_path / "model.yaml"
     shutil.copytree(good, bag)
     os.mkfifo(bag / "named.db3")
@@ -227,7 +227,7 @@ def test_a_pipe_that_nobody_names_does_not_matter(good: Path, tmp_path: Path) ->
 
 
 def test_a_state_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
-    """The identifier sets it aside and begins anew."""
+    """The identifier renames it and starts without it."""
     os.mkfifo(tmp_path / "state")
     os.close(os.open(tmp_path / "state", os.O_RDWR | os.O_NONBLOCK))
     with pytest.raises(BadRecording, match="not a file but a pipe"):
@@ -236,7 +236,7 @@ def test_a_state_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def model(rec: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A model without the sum of its lines, as after a change by hand."""
+    """A model without its checksum, as after a change by hand."""
     path = tmp_path_factory.mktemp("model") / "model.yaml"
     assert cli("fit", rec, *RIGID, "--set", "length=1024", "--model", path).code == 0
     return path.read_text().partition("\n")[2]
@@ -255,7 +255,7 @@ def model(rec: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     ],
 )
 def test_a_model_far_too_large_is_one_line_at_once(what: str, change: Callable[[str], str], rec: Path, model: str, tmp_path: Path) -> None:
-    """Nobody waits a minute to hear that it was the wrong file."""
+    """A wrong file gives an error without a wait."""
     path = tmp_path / "model.yaml"
     path.write_text(change(model))
     with little_memory():
@@ -276,7 +276,7 @@ def test_settings_far_too_long_are_one_line_at_once(words: tuple[str, ...], rec:
 
 @pytest.mark.parametrize(("head", "text"), [("", "a" * 64), ("", "1.0 " * 16), ("time,u,y\n0,1,2\n1,2,3\n", "a;b;" * 16)])
 def test_a_line_of_200_mb_is_refused_at_once(text: str, head: str, tmp_path: Path) -> None:
-    """First or last line: it is said, and nothing is made of it."""
+    """First or last line: an error, and no result."""
     path = tmp_path / "long.csv"
     with path.open("w") as file:
         file.write(head)
@@ -294,7 +294,7 @@ def test_a_line_of_200_mb_is_refused_at_once(text: str, head: str, tmp_path: Pat
     ids=lambda words: words[0],
 )
 def test_yaml_that_is_or_becomes_far_too_long_is_one_line_at_once(words: tuple[str, ...], kind: str, rec: Path, tmp_path: Path) -> None:
-    """Whatever it is for: as text, or as what repeats itself is read."""
+    """For any purpose: too long as text, or by repeated aliases."""
     path = tmp_path / "p.yaml"
     path.write_text("a: 1\n" + "# nothing\n" * 4_000_000 if kind == "40 MB" else f"{doubling()}pattern: *n30\ndescription: *n30\n")
     if words[0] == "experiment":
@@ -337,7 +337,7 @@ ALONE = {
 
 
 def test_who_opens_a_file_that_somebody_names_has_looked_at_it() -> None:
-    """A new reader goes through ``bags.opening``, or stands in this table with the reason why it need not."""
+    """A new reader must use ``bags.opening``, or be in this table with a reason."""
     there = {
         path.relative_to(ROOT / "xy_sysid").as_posix(): text
         for path in (ROOT / "xy_sysid").rglob("*.py")
@@ -348,7 +348,7 @@ def test_who_opens_a_file_that_somebody_names_has_looked_at_it() -> None:
 
 
 def test_yaml_is_counted_as_it_reads_and_not_as_it_is_written() -> None:
-    """A part that is repeated counts as often; what holds itself never ends; a few repeated parts are nothing."""
+    """Repeated parts count each time; a part that contains itself is refused; a few repeated parts are accepted."""
     assert too_much("a: &a [1, 2]\nb: [*a, *a]\n") == ""
     assert "values" in too_much("".join(f"{b}: &{b} [*{a}, *{a}]\n" if a else f"{b}: &{b} [1]\n" for a, b in DOUBLING))
     assert "values" in too_much("a: &a [*a]\n")

@@ -1,4 +1,4 @@
-"""Where a model fails: each kind of place is found on a simulated axis that fails there, and none on one that does not."""
+"""Where a model fails: each kind of place is found on a simulated axis that fails there, and none on an exact one."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_linear_axis_stands_at_the_noise_floor() -> None:
     ("effect", "low", "high"), [("base_resonance", 40.0, 50.0), ("cogging", 2.0, 12.0), ("coulomb_friction", 0.3, 2.0), ("backlash", 100.0, 330.0)]
 )
 def test_the_worst_frequency_is_where_the_effect_acts(effect: str, low: float, high: float) -> None:
-    """A swinging base at its own frequency, friction at the lowest, a gap at the highest."""
+    """A base resonance at its own frequency, friction at the lowest, a gap at the highest."""
     found = compared(effect)
     assert any(place.kind == "frequency" for place in found.places)
     worst = found.frequency[int(np.nanargmax(found.error_over_floor))]
@@ -55,7 +55,7 @@ def test_the_worst_frequency_is_where_the_effect_acts(effect: str, low: float, h
 
 
 def test_what_chance_gives_a_band_of_few_lines_is_exceeded_once_in_a_thousand() -> None:
-    """Drawn: the mean power of 1 to 30 lines of noise."""
+    """Simulated: the mean power of 1 to 30 lines of noise."""
     rng = np.random.default_rng(5)
     for lines in (1, 2, 5, 30):
         drawn = rng.standard_normal((200_000, 2 * lines)) ** 2
@@ -79,7 +79,7 @@ def test_a_constant_load_is_a_constant_error() -> None:
 
 
 def test_saturation_shows_at_large_amplitudes() -> None:
-    """The input's envelope tells it from friction."""
+    """The input's envelope distinguishes it from friction."""
     place = next(place for place in compared("saturation").places if place.kind == "amplitude")
     assert place.low > 0.9
 
@@ -105,7 +105,7 @@ def test_too_short_a_recording_is_refused() -> None:
 
 
 def test_the_floor_is_that_of_a_diagnosis() -> None:
-    """The floor by which a fit is judged, of the whole recording, whichever part is compared: within 1 %, also of a model that was fitted here."""
+    """The floor is that of the fit, from the full recording, for any compared part: within 1 %, also for a model fitted here."""
     recording = simulate(20.0, effects=["coulomb_friction"], machine="rigid.yaml")
     run = recording.run("x")
     data = prepare(run.sampling_rate, run.voltage, run.position)
@@ -122,7 +122,7 @@ def test_a_short_run_can_be_compared() -> None:
 
 
 def test_of_a_model_that_runs_away_nothing_else_is_said() -> None:
-    """Its velocity grows beyond every number: no place, no warning, one sentence."""
+    """Its velocity overflows: no place, no warning, one sentence."""
     random = np.random.default_rng(3)
     voltage, position = random.normal(size=4000), np.cumsum(random.normal(size=4000)) * 1e-4
     with np.errstate(over="ignore", invalid="ignore"):

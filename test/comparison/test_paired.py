@@ -1,4 +1,4 @@
-"""Which of two models is better: in pairs, on data that neither has seen."""
+"""Which of two models is better: a paired test on held-out data."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_friction_in_the_model_is_better_where_friction_acts() -> None:
 
 
 def test_no_difference_is_no_difference() -> None:
-    """The same model, and one that differs by less than anybody cares for."""
+    """The same model, and one with a negligible difference."""
     right = TRUE.with_effect("coulomb_friction", (0.2,))
     same = compared(right, right)
     assert same.better is None and same.ratio == 1.0 and same.changes == ()
@@ -51,7 +51,7 @@ def test_no_difference_is_no_difference() -> None:
 
 
 def test_noise_alone_is_hardly_ever_called_a_change() -> None:
-    """Two models whose errors differ by chance only: in 40 tries at most a few verdicts, and few bands."""
+    """Two models whose errors differ only by chance: in 40 tries at most a few verdicts, and few bands."""
     random = np.random.default_rng(3)
     verdicts, changes = 0, 0
     for _ in range(40):
@@ -65,7 +65,7 @@ def test_noise_alone_is_hardly_ever_called_a_change() -> None:
 
 
 def test_too_little_data_is_refused() -> None:
-    """A t-test over two windows would be a joke."""
+    """A t-test over two windows would be meaningless."""
     y = np.cumsum(np.random.default_rng(0).standard_normal(600))
     with pytest.raises(BadInput, match="unseen data is"):
         paired(np.zeros(599), np.zeros(599), y, RATE)

@@ -1,4 +1,4 @@
-"""What a residual's correlations tell: nothing of unrelated signals, and which inputs a model has missed."""
+"""Correlations of a residual: none for unrelated signals, and significant ones for an input that a model misses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def noise(seed: int) -> np.ndarray:
 
 
 def test_a_white_residual_stays_within_its_bounds() -> None:
-    """By chance one lag in twenty is outside, over thirty draws."""
+    """One lag in twenty is outside by chance, over thirty draws."""
     outside, own = [], []
     for seed in range(30):
         found = residual_correlation(noise(seed), noise(1000 + seed))
@@ -49,7 +49,7 @@ def test_what_the_model_misses_stands_out_at_its_delay() -> None:
 
 
 def test_the_autocorrelation_is_that_of_the_process() -> None:
-    """Differences of white noise, as an encoder's: minus a half at one sample, nothing beyond."""
+    """Differences of white noise, as of an encoder: -0.5 at one sample, 0 beyond."""
     found = residual_correlation(np.diff(noise(3), prepend=0.0), noise(4))
     assert found.autocorrelation[0] == 1.0
     assert found.autocorrelation[1] == pytest.approx(-0.5, abs=0.02)
@@ -65,6 +65,6 @@ def test_the_autocorrelation_is_that_of_the_process() -> None:
     ],
 )
 def test_what_cannot_be_told_is_refused_with_the_reason(residual: np.ndarray, voltage: np.ndarray, words: str) -> None:
-    """Lengths, too few samples, a standing signal."""
+    """Lengths, too few samples, a constant signal."""
     with pytest.raises(BadInput, match=words):
         residual_correlation(residual, voltage)

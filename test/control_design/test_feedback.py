@@ -48,7 +48,7 @@ def test_margins_are_those_of_python_control() -> None:
 
 @pytest.mark.parametrize("damping", [0.03, 3e-3, 3e-4])
 def test_the_margins_see_a_lightly_damped_mode(damping: float) -> None:
-    """However sharp the resonance is, margins are those of 400000 lines around it; 600 lines evenly by ratio say 3.3 where 2.1 is left."""
+    """For a resonance of any sharpness the margins equal those of 400000 lines around it; 600 log-spaced lines would give 3.3 instead of 2.1."""
     system = sampled(axis().with_effect("base_resonance", (2.0 * damping, 150.0, damping, damping)), RATE)
     controller = feedback(known(), RATE, Asked(bandwidth=20.0)).controller
     fine = np.unique(
@@ -71,7 +71,7 @@ def test_a_controllers_matrices_are_its_response() -> None:
 
 
 def test_every_sample_of_the_parameters_keeps_the_margins() -> None:
-    """The worst case over the intervals counts: wider intervals cost bandwidth, and each sample's loop is stable with the margins asked for."""
+    """The worst case over the intervals counts: wider intervals reduce the bandwidth, and each sample's loop has the requested margins."""
     sure, unsure = feedback(known("base_resonance", spread=0.01), RATE), feedback(known("base_resonance", spread=0.3, delay=0.5), RATE)
     assert unsure.crossover < sure.crossover
     for item in samples(known("base_resonance", spread=0.3, delay=0.5), 24):
@@ -80,7 +80,7 @@ def test_every_sample_of_the_parameters_keeps_the_margins() -> None:
 
 
 def test_a_bandwidth_that_cannot_be_had_is_refused() -> None:
-    """Asked for more than delay and margins allow, it says what the margins would be; no such gains are given."""
+    """A bandwidth beyond delay and margins gives an error with the resulting margins, and no gains."""
     with pytest.raises(BadInput, match=r"bandwidth is 400 Hz: .*Ask for less"):
         feedback(known(), RATE, Asked(bandwidth=400.0))
     asked = feedback(known(), RATE, Asked(bandwidth=10.0))
@@ -88,7 +88,7 @@ def test_a_bandwidth_that_cannot_be_had_is_refused() -> None:
 
 
 def test_a_period_of_calculation_is_part_of_every_margin_and_of_the_simulation() -> None:
-    """By default the voltage is written one period after the reading: this test closes that loop by itself, for samples of the parameters too."""
+    """By default the voltage is written one period after the reading: the test closes that loop independently, also for samples of the parameters."""
     model = known("base_resonance", spread=0.05)
     used, at_once = (use(model, rate=RATE, limit=5.0, travel=(-0.02, 0.02), calculation=periods) for periods in (1.0, 0.0))
     assert used.calculation == 1.0 and used.feedback is not None and at_once.feedback is not None and used.allowed is not None
@@ -109,13 +109,13 @@ def test_a_period_of_calculation_is_part_of_every_margin_and_of_the_simulation()
 
 
 def test_gains_of_an_undetermined_axis_are_refused() -> None:
-    """A gain or a pole that nobody knows to a factor of two makes no controller."""
+    """A gain or a pole with an uncertainty of more than a factor of two gives no controller."""
     with pytest.raises(BadInput, match=r"gain is known to worse than a factor of two"):
         feedback(known(gain=0.9), RATE)
 
 
 def test_a_drive_that_is_wired_backwards_gets_negative_gains() -> None:
-    """The loop of an axis with a negative gain is stable all the same."""
+    """The loop of an axis with a negative gain is stable, too."""
     from dataclasses import replace
 
     model = known()
@@ -125,14 +125,14 @@ def test_a_drive_that_is_wired_backwards_gets_negative_gains() -> None:
 
 
 def test_the_same_gains_are_a_pid_and_a_servo_drives_cascade() -> None:
-    """kd (s + position gain) (s + 1 / integral time) / s: what the drive's fields say is the same controller."""
+    """kd (s + position gain) (s + 1 / integral time) / s: the fields of a drive give the same controller."""
     found = feedback(known(), RATE)
     product = np.polymul([1.0, found.position_gain], [1.0, 1.0 / found.integral_time]) * found.velocity_gain
     assert product == pytest.approx([found.controller.kd, found.controller.kp, found.controller.ki])
 
 
 def test_encoder_noise_makes_as_much_voltage_as_is_said() -> None:
-    """The loop at rest under encoder noise: the simulated voltage's rms is the predicted one."""
+    """At rest under encoder noise, the rms of the simulated voltage is the predicted one."""
     model = known()
     found = feedback(model, RATE, Asked(bandwidth=30.0), encoder=Encoder(noise=1e-6))
     still = s_curve([0.0, 0.0], Bounds(1.0, 1.0, 1.0), RATE, settle=10.0)
@@ -142,7 +142,7 @@ def test_encoder_noise_makes_as_much_voltage_as_is_said() -> None:
 
 
 def test_the_integral_stands_still_while_the_drive_is_at_its_limit() -> None:
-    """A step far beyond what the drive can do overshoots little: the integral does not wind up."""
+    """A step far beyond the drive's limit overshoots little: no integral windup."""
     model = known()
     found = feedback(model, RATE, Asked(bandwidth=20.0), limit=1.0)
     step = s_curve([0.0, 0.05], Bounds(1e3, 1e6, 1e9), RATE, settle=3.0)
@@ -152,7 +152,7 @@ def test_the_integral_stands_still_while_the_drive_is_at_its_limit() -> None:
 
 
 def test_the_poles_of_the_closed_loop_tell_an_unstable_one() -> None:
-    """Ten times the gains leave the unit circle."""
+    """With ten times the gains, poles are outside the unit circle."""
     found = feedback(known(), RATE)
     wild = Controller(10 * found.controller.kp, 10 * found.controller.ki, 10 * found.controller.kd, found.controller.derivative_time)
     assert np.max(np.abs(closed_poles(sampled(axis(), RATE), wild))) > 1.0 and not margins(sampled(axis(), RATE), wild).stable

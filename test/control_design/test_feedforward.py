@@ -50,7 +50,7 @@ def rms(values: FloatArray) -> float:
 
 
 def test_the_model_moves_alone_as_it_does_along_a_recording_of_itself() -> None:
-    """One physics: sample by sample, where its own motion brings it, a model moves as ``axis.model`` says along the measured position."""
+    """Consistency: the sampled model with its own position moves like ``axis.model`` along the measured position."""
     for names in [
         (),
         *((name,) for name in EFFECTS),
@@ -64,7 +64,7 @@ def test_the_model_moves_alone_as_it_does_along_a_recording_of_itself() -> None:
 
 
 def test_the_whole_feedforward_brings_the_model_along_the_path_without_any_feedback() -> None:
-    """Delay, hold, lag, resonances, friction with its memory, forces, encoder and amplifier are undone: under 0.5 % of what the base alone leaves."""
+    """Delay, hold, lag, resonances, friction, forces, encoder and amplifier are compensated: below 0.5 % of the error with the base alone."""
     wanted = path()
     simple = feedforward(axis(), wanted).voltage
     for name in [name for name in EFFECTS if name not in LEFT]:
@@ -75,12 +75,12 @@ def test_the_whole_feedforward_brings_the_model_along_the_path_without_any_feedb
 
 
 def test_what_is_not_undone_is_named() -> None:
-    """A change with time and a gap are left, and the answer says so."""
+    """A change with time and a gap are not compensated, and the answer says so."""
     assert {name for name, _ in not_undone(axis("gain_drift", "backlash", "coulomb_friction"))} == LEFT
 
 
 def test_ks_kv_ka_follow_from_the_parameters_with_their_intervals() -> None:
-    """kV is 1 / gain, kA is 1 / (gain pole), kS the friction; each interval is made of the parameters', and each names the one that makes it wide."""
+    """kV is 1 / gain, kA is 1 / (gain pole), kS the friction; each interval follows from those of the parameters, and names the main contribution."""
     found = gains(known("coulomb_friction", pole=0.1))
     coulomb = STANDARD["coulomb_friction"].typical[0]
     assert found["kS"].value == pytest.approx(coulomb) and (found["kS"].low, found["kS"].high) == pytest.approx((0.98 * coulomb, 1.02 * coulomb))
@@ -92,7 +92,7 @@ def test_ks_kv_ka_follow_from_the_parameters_with_their_intervals() -> None:
 
 
 def test_what_differs_by_direction_and_what_a_load_holds_have_gains_of_their_own() -> None:
-    """kS and kV forth and back, breakaway, kG and kCos appear where the model has them, and only there."""
+    """kS and kV forth and back, breakaway, kG and kCos appear only if the model has them."""
     names = {item.name for item in gains(known("coulomb_friction")).items}
     assert names == {"kS", "kV", "kA"}
     assert {"kS forth", "kS back"} <= {item.name for item in gains(known("asymmetric_friction")).items}
@@ -106,7 +106,7 @@ def test_what_differs_by_direction_and_what_a_load_holds_have_gains_of_their_own
 
 
 def test_a_number_that_the_data_do_not_determine_says_so() -> None:
-    """Known to worse than a factor of two, or without any interval, a gain is marked; it is never passed off as sure."""
+    """A gain with an uncertainty above a factor of two, or without an interval, is marked."""
     wide = gains(known("coulomb_friction", coulomb_friction__coulomb=1.5))["kS"]
     assert not wide.determined and "coulomb_friction.coulomb" in wide.doubt
     assert not any(item.determined for item in gains(unknown("coulomb_friction")).items)
@@ -129,7 +129,7 @@ def test_an_angle_is_judged_by_the_width_of_its_interval() -> None:
 
 
 def test_the_simple_feedforward_leaves_friction_where_ks_is_known_nothing() -> None:
-    """kS sign(v) + kV v + kA a, early by the delay, is the whole feedforward of an axis with Coulomb friction."""
+    """kS sign(v) + kV v + kA a, advanced by the delay, is the full feedforward of an axis with Coulomb friction."""
     model, wanted = known("coulomb_friction"), path()
     early = wanted.ahead(DELAY + 0.5 / RATE)
     simple, whole = simple_feedforward(gains(model), early), feedforward(model.model, wanted).voltage
@@ -138,7 +138,7 @@ def test_the_simple_feedforward_leaves_friction_where_ks_is_known_nothing() -> N
 
 
 def test_a_path_keeps_its_bounds_and_stands_at_its_ends() -> None:
-    """Speed, acceleration and jerk stay within their bounds, and each place is reached."""
+    """Speed, acceleration and jerk stay within their bounds, and each position is reached."""
     bounds = Bounds(0.1, 2.0, 100.0)
     wanted = s_curve([0.0, 0.03, -0.02], bounds, RATE)
     assert np.max(np.abs(wanted.speed)) <= 1.0001 * bounds.speed
@@ -159,7 +159,7 @@ def test_the_fastest_path_uses_what_the_drive_has_and_not_more() -> None:
 
 
 def test_tables_hold_the_laws_and_what_their_intervals_leave() -> None:
-    """Force and scale error by position, friction by speed: the values of the laws, intervals around them, and units in the header."""
+    """Tables of force and scale error by position, and of friction by speed: values of the laws, their intervals, and units in the header."""
     model = known("cogging", "lead_error", "stribeck_friction", spread=0.01)
     found = {item.name: item for item in position_tables(model, (-0.01, 0.01))}
     assert set(found) == {"force", "scale"}
@@ -175,7 +175,7 @@ def test_tables_hold_the_laws_and_what_their_intervals_leave() -> None:
 
 
 def test_a_recorded_motion_becomes_a_path_without_delay() -> None:
-    """Below the frequency asked for, position, speed and acceleration are those of the recording."""
+    """Below the given frequency, position, speed and acceleration are those of the recording."""
     t = np.arange(4000) / RATE
     wanted = recorded(0.01 * np.sin(2 * np.pi * 3.0 * t), RATE, 50.0)
     inside = slice(400, -400)
@@ -186,13 +186,13 @@ def test_a_recorded_motion_becomes_a_path_without_delay() -> None:
 
 
 def test_a_resonance_that_only_the_load_shows_is_refused_in_one_line() -> None:
-    """Nothing of it is undone by a feedforward that ends at the motor."""
+    """A feedforward to the motor does not compensate it."""
     with pytest.raises(BadInput, match=r"load_side_resonance is a spring between motor and encoder.*an encoder at the motor"):
         feedforward(axis().with_effect("load_side_resonance", (60.0, 0.05)), path())
 
 
 def test_with_an_encoder_on_the_load_there_are_gains_and_no_loops() -> None:
-    """kV and kA hold for both masses together; a loop around a spring that no design here knows is refused, in words."""
+    """kV and kA are those of both masses together; a loop around a spring without a design here is refused with a reason."""
     model = PhysicalModel(axis().with_effect("load_side_resonance", (60.0, 0.05)))
     used = use(model, rate=2000.0, limit=5.0)
     assert [gain.name for gain in used.gains.items[1:3]] == ["kV", "kA"]
@@ -201,7 +201,7 @@ def test_with_an_encoder_on_the_load_there_are_gains_and_no_loops() -> None:
 
 
 def test_a_lag_is_looked_ahead_of_by_what_its_inverse_leaves() -> None:
-    """A lag far below a sample changes nothing, and one of many samples takes half a sample."""
+    """A lag far below a sample has no effect, and one of many samples adds half a sample."""
     h = 1.0 / RATE
     for lag, ahead in ((1e-3 * h, 1e-3), (100.0 * h, 0.5), (h, 1.0 - 1.0 / np.expm1(1.0))):
         model = replace(axis(), effects=(("amplifier_lag", (lag,)),))
@@ -210,7 +210,7 @@ def test_a_lag_is_looked_ahead_of_by_what_its_inverse_leaves() -> None:
 
 @pytest.mark.parametrize("loop", [step_of, _run_of, _loop_of])
 def test_a_new_library_never_runs_in_the_loop_of_one_that_is_gone(loop: Callable[[Library], object], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Python gives a new library the place of a deleted one in memory; each has its own loop all the same, and a library that stays keeps it."""
+    """A new library may get the memory address of a deleted one; each has its own loop nevertheless, and an existing library keeps its loop."""
     for module in (sample_step, inverse, closed_loop):
         monkeypatch.setattr(module, "compiled_text", lambda *_: lambda: None)
     made = []

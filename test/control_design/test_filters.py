@@ -24,7 +24,7 @@ RATE = 2000.0
 
 
 def test_a_mode_is_the_models_resonance_with_its_interval() -> None:
-    """Antiresonance with the encoder's side held, resonance of the free axis, in Hz; a rigid axis has none."""
+    """Antiresonance: the encoder's side held; resonance: the free axis; in Hz. A rigid axis has none."""
     split, frequency, damping, pole_damping = STANDARD["base_resonance"].typical
     (mode,) = modes(known("base_resonance"))
     assert mode.held.value == pytest.approx(frequency, rel=1e-4) and mode.held.high == pytest.approx(1.02 * frequency, rel=1e-3)
@@ -37,7 +37,7 @@ def test_a_mode_is_the_models_resonance_with_its_interval() -> None:
 
 
 def test_shapers_leave_what_their_names_promise() -> None:
-    """ZV, ZVD and MZV leave nothing of the vibration at their frequency and EI a twentieth; over an interval ZVD and EI leave less than ZV."""
+    """ZV, ZVD and MZV remove the vibration at their frequency, EI leaves a twentieth; over an interval ZVD and EI leave less than ZV."""
     (mode,) = modes(known("base_resonance", spread=0.1))
     found = {item.name: item for item in shapers(mode)}
     assert set(found) == {"zv", "mzv", "zvd", "ei"}
@@ -52,14 +52,14 @@ def test_shapers_leave_what_their_names_promise() -> None:
 
 
 def test_a_frequency_whose_interval_has_no_end_may_be_any() -> None:
-    """The worst case of each shaper is all of the vibration then, not what it leaves at the best value."""
+    """The worst case of each shaper is then the full vibration, not the residual at the best value."""
     (mode,) = modes(known("base_resonance"))
     endless = replace(mode, held=replace(mode.held, high=float("inf")))
     assert [item.worst for item in shapers(endless)] == [1.0] * 4 and shapers(endless)[0].vibration < 1e-6
 
 
 def test_a_shaped_path_arrives_and_excites_less() -> None:
-    """A quick move through the shaper ends at the same place, and a mass on a spring that is carried along rings a twentieth as much afterwards."""
+    """A fast move through the shaper ends at the same position, and a mass on a spring vibrates a twentieth as much afterwards."""
     (mode,) = modes(known("screw_compliance"))
     quick = s_curve([0.0, 0.01], Bounds(0.2, 20.0, 1e4), RATE, settle=0.1)
     shaped = best_shaper(shapers(mode)).shape(quick)
@@ -75,7 +75,7 @@ def test_a_shaped_path_arrives_and_excites_less() -> None:
 
 
 def test_a_notch_takes_the_resonance_and_says_what_it_costs() -> None:
-    """Its response at the resonance is its depth, 1 far below, and its phase at the crossover is what it says."""
+    """Its response at the resonance is its depth, 1 far below, and its phase at the crossover is the stated one."""
     (mode,) = modes(known("screw_compliance"))
     made = notch(mode, RATE)
 
@@ -89,7 +89,7 @@ def test_a_notch_takes_the_resonance_and_says_what_it_costs() -> None:
 
 
 def test_a_resonance_that_the_sampling_cannot_show_gets_no_notch_and_a_reason() -> None:
-    """Above 0.45 of the sampling rate a notch would stand at the alias, far below: it is refused, and the loop has no filter there."""
+    """Above 0.45 of the sampling rate a notch would act at the alias, far below: it is refused, and the loop has no filter there."""
     for frequency in (920.0, 1500.0):
         model = known("screw_compliance")
         of = replace(model, model=model.model.with_effect("screw_compliance", (0.06, frequency, 0.01, 0.01)), known=())
@@ -102,7 +102,7 @@ def test_a_resonance_that_the_sampling_cannot_show_gets_no_notch_and_a_reason() 
 
 
 def test_what_limits_the_bandwidth_is_named_with_its_cost() -> None:
-    """Each part's phase at the crossover is that of its own transfer function, and a loop without the part reaches more; nothing else is named."""
+    """The phase of each part at the crossover is that of its transfer function, and a loop without the part is faster; no others are named."""
     model = known("base_resonance")
     loop = feedback(model, RATE)
     found = bandwidth_of(model, RATE, loop.nominal.crossover)

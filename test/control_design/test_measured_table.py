@@ -1,4 +1,4 @@
-"""The force by position that a model leaves: a table only where the recording has one, and with its own judge."""
+"""The unmodelled position-dependent force: a table only if the recording shows one, validated on held-out data."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from xy_sysid.control_design.use import use
 BELOW, COGGING = 400.0, 0.2  # Hz, V
 
 
-# the simulated table with dry friction and nothing else
+# the simulated table with dry friction only
 RUBBING = xy.PhysicalModel(AxisModel(0.097, 1.29e-3, 246.0).with_effect("coulomb_friction", (0.3,)), "x")
 
 
 def test_what_the_model_leaves_by_position_becomes_a_table() -> None:
-    """Cogging that nobody put into the model: another recording of the machine is predicted better with the table, and the command says so."""
+    """Cogging without a law in the model: the table improves the prediction of another recording of the machine, and the command says so."""
     run, judge = (recorded(f"coulomb_friction=0.3+cogging={COGGING}", 12.0, seed=seed).run("x") for seed in (1, 2))
     table = measured_table(RUBBING, run, BELOW)
     assert table is not None and table.before**2 - table.after**2 > 0.5 * COGGING**2 / 2.0
@@ -36,14 +36,14 @@ def test_what_the_model_leaves_by_position_becomes_a_table() -> None:
 
 
 def test_a_model_that_leaves_nothing_by_position_gets_no_table() -> None:
-    """Noise and reversals are no function of the position, whatever the places."""
+    """Noise and reversals are not functions of the position."""
     run = recorded("coulomb_friction=0.3", 12.0).run("x")
     assert measured_table(RUBBING, run, BELOW) is None
     assert not use(RUBBING, run, limit=10.0).tables
 
 
 def test_a_recording_that_stands_still_is_refused() -> None:
-    """Without motion there are no places."""
+    """Without motion there is no table."""
     run = recorded("coulomb_friction=0.3", 12.0).run("x")
     still = xy.Recording.from_arrays(run.sampling_rate, np.zeros(2000), np.zeros(2000)).run("x")
     with pytest.raises(xy.BadInput, match="all the same"):

@@ -1,4 +1,4 @@
-"""The table in docs/use.md of what MuJoCo's language loses."""
+"""The table in docs/use.md of losses in MJCF."""
 
 from __future__ import annotations
 
@@ -18,6 +18,6 @@ def test_the_table_of_the_documentation_is_what_the_export_says() -> None:
 
 
 def test_an_effect_that_mujoco_knows_loses_nothing_and_one_that_it_does_not_is_named() -> None:
-    """Cogging is a word of MuJoCo; a gap is not."""
+    """MJCF can describe cogging, but not a gap."""
     assert lost("cogging") == lost("presliding_hysteresis") == NOTHING
     assert "not a first-order lag" in lost("backlash")

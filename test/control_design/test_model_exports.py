@@ -1,4 +1,4 @@
-"""A used model in other programs' words: each is loaded by a program that is not ours."""
+"""Exports of a model for other programs: each is loaded by an independent program."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def noise(count: int = 500) -> FloatArray:
 
 
 def in_c(model: AxisModel, folder: Path, voltage: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Positions, and the feedforward of a path with what it should be, from the compiled C source."""
+    """Positions, and the feedforward of a path with its expected value, from the compiled C source."""
     of = program(model, RATE)
     header, text = to_c.source(of, "axis", "a test")
     (folder / "axis.h").write_text(header)
@@ -73,7 +73,7 @@ def in_c(model: AxisModel, folder: Path, voltage: FloatArray) -> tuple[FloatArra
 
 
 def test_c_source_is_the_simulation_and_its_inverse(tmp_path: Path) -> None:
-    """Every effect at once that can act together, and a gap: compiled without a warning by gcc, bit for bit the same numbers."""
+    """All effects that can act together, and a gap: gcc compiles without a warning, and the numbers are equal bit for bit."""
     rest = tuple(name for name in ALL if name not in ("backlash", "coulomb_friction", "stribeck_friction", "asymmetric_friction"))
     for names in (MIXED, rest, ("backlash", "stribeck_friction", "asymmetric_friction")):
         shown, voltage, wanted = in_c(axis(*names), tmp_path, noise())
@@ -81,7 +81,7 @@ def test_c_source_is_the_simulation_and_its_inverse(tmp_path: Path) -> None:
 
 
 def test_python_source_needs_nothing_and_is_the_same(tmp_path: Path) -> None:
-    """The module imports math alone; an interpreter without our packages runs it to the same numbers."""
+    """The module imports only math; an interpreter without our packages gives the same numbers."""
     file = tmp_path / "axis.py"
     file.write_text(to_python.source(program(axis(*MIXED), RATE), "a test"))
     voltage = noise(200)
@@ -130,7 +130,7 @@ def _own(function: Callable[..., float]) -> AxisModel:
 
 @pytest.mark.parametrize("function", [_push, _divided])
 def test_an_effect_of_ones_own_is_printed_or_refused(tmp_path: Path, function: Callable[..., float]) -> None:
-    """A user's law in numbers, ifs, powers and quotients of whole numbers goes into C; one that does more is refused in one line."""
+    """A user's law with arithmetic, ifs, powers and quotients of integers is translated to C; any other is refused in one line."""
     of = program(_own(function), RATE)
     header, text = to_c.source(of, "axis", "a test")
     (tmp_path / "axis.h").write_text(header)
@@ -181,13 +181,13 @@ def in_mujoco(made: Mjcf, voltage: FloatArray) -> FloatArray:
 
 
 def speeds_apart(model: AxisModel, voltage: FloatArray) -> float:
-    """rms of the difference of the speeds in MuJoCo and here, as a part of the motion."""
+    """rms of the difference of the speeds in MuJoCo and here, relative to the motion."""
     theirs, ours = (np.diff(position) for position in (in_mujoco(mjcf(model, RATE), voltage), simulate_alone(model, RATE, voltage)))
     return float(np.sqrt(np.mean((theirs - ours) ** 2) / np.mean(ours**2)))
 
 
 def test_mujoco_says_each_effect_or_names_it_as_lost() -> None:
-    """What is not named as lost moves in MuJoCo as here, within 1 % of the motion, most within 0.3 %."""
+    """Effects that are not listed as lost move in MuJoCo as here, within 1 % of the motion, most within 0.3 %."""
     voltage = noise(1000)
     for names in [(), *((name,) for name in ALL)]:
         model = axis(*names)
@@ -199,13 +199,13 @@ def test_mujoco_says_each_effect_or_names_it_as_lost() -> None:
 
 @pytest.mark.parametrize("effect", [effect.name for effect in STANDARD.acting if effect.category == "force" and effect.name not in LOST])
 def test_mujoco_says_each_force_of_an_axis_that_is_wired_backwards(effect: str) -> None:
-    """The input pushes the other way, and a spring still pulls back: the same motion in MuJoCo as here, within 1 %."""
+    """With a negative gain a spring still acts towards its rest: the same motion in MuJoCo as here, within 1 %."""
     model = replace(axis(effect), gain=-axis().gain)
     assert not mjcf(model, RATE).lost and speeds_apart(model, noise(1000)) < 0.01
 
 
 def test_an_axis_in_radians_turns_in_mujoco() -> None:
-    """Every joint of it is a hinge, also the one behind a resonance; those of an axis in metres slide."""
+    """A rotary axis has only hinges, also behind a resonance; an axis in metres has slides."""
     for output, kind in (("rad", mujoco.mjtJoint.mjJNT_HINGE), ("m", mujoco.mjtJoint.mjJNT_SLIDE)):
         (text,) = export(use(known("base_resonance", units=Units("V", output)), limit=5.0), "mujoco").files.values()
         assert mujoco.MjModel.from_xml_string(text).jnt_type.tolist() == [kind, kind], output
@@ -213,7 +213,7 @@ def test_an_axis_in_radians_turns_in_mujoco() -> None:
 
 @pytest.mark.parametrize("effect", ["coulomb_friction=0.3", "cogging=0.2", "presliding_hysteresis=0.3"])
 def test_the_circle_through_mujoco_closes(effect: str) -> None:
-    """Driven with a recorded input, MuJoCo errs on held-out data at most 1.05 times as much as we do; diagnosed again, its motion has the effect."""
+    """With a recorded input, MuJoCo's held-out error is at most 1.05 times ours; its motion shows the effect."""
     run, judge = recorded(effect, 10.0).run("x"), recorded(effect, 3.0, seed=99).run("x")
     model = xy.refine(run, add=[effect.partition("=")[0]], auto=False).model.model
     measured = np.diff(judge.position)
@@ -226,7 +226,7 @@ def test_the_circle_through_mujoco_closes(effect: str) -> None:
 
 
 def test_a_urdf_is_parsed_by_mujoco_and_names_what_it_loses() -> None:
-    """Mass, damping, friction and limits come out of another parser; each effect that URDF cannot say is in a comment and in the note."""
+    """Another parser reads mass, damping, friction and limits; each effect that URDF cannot describe is in a comment and in the note."""
     made = export(use(known("coulomb_friction", "cogging"), limit=5.0, travel=(-0.025, 0.025)), "urdf")
     (text,) = made.files.values()
     model = mujoco.MjModel.from_xml_string(text)
@@ -252,7 +252,7 @@ def test_a_joint_whose_travel_nobody_knows_has_no_ends(output: str) -> None:
 
 
 def test_an_sdf_says_what_the_model_is_and_names_what_it_loses() -> None:
-    """Mass, damping, friction and spring stand where SDFormat 1.9 has them; each effect that SDF cannot say is in a comment and in the note."""
+    """Mass, damping, friction and spring are in elements of SDFormat 1.9; effects that SDF cannot describe are in a comment and in the note."""
     made = export(use(known("coulomb_friction", "return_spring", "cogging"), limit=5.0), "sdf")
     (text,) = made.files.values()
     root = ElementTree.fromstring(text)
@@ -272,7 +272,7 @@ def test_an_sdf_says_what_the_model_is_and_names_what_it_loses() -> None:
 
 
 def test_damping_in_sdf_and_urdf_is_the_viscous_part_alone() -> None:
-    """Neither has drag with the square of speed, so its force at 1 m/s is no part of the damping: it is named as lost."""
+    """Neither has drag with the square of speed: it is listed as lost, and not added to the damping."""
     used = use(known("quadratic_drag"), limit=5.0)
     sdf_text, urdf_text = (next(iter(export(used, target).files.values())) for target in ("sdf", "urdf"))
     damping = ElementTree.fromstring(sdf_text).findtext("model/joint[@type='prismatic']/axis/dynamics/damping")
@@ -294,7 +294,7 @@ def test_matlab_gets_parameters_and_a_function(tmp_path: Path) -> None:
 
 
 def test_every_target_writes_for_an_axis_that_has_all_of_it(tmp_path: Path) -> None:
-    """--to all writes what it can, and names what it cannot."""
+    """--to all writes the possible targets, and names the others."""
     file = tmp_path / "axes.yaml"
     xy.save(known(*MIXED), file)
     said = cli("use", file, "--limit", "5", "--to", "all", "-o", tmp_path / "out")

@@ -1,4 +1,4 @@
-"""The numbers for an ODrive, against a simulation of its own controller: turns, N m, 8 kHz, and the estimator behind its encoder."""
+"""The numbers for an ODrive, compared with a simulation of its controller: turns, N m, 8 kHz, and its encoder estimator."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from xy_sysid.units import Units
 PERIOD = 125e-6  # s
 TURN = 2.0 * math.pi  # rad
 UNITS = Units("N m", "rad")
-LATE = round(DELAY / PERIOD) + 1  # cycles of delay: that of the axis, and one until the torque is written
+LATE = round(DELAY / PERIOD) + 1  # cycles of delay: of the axis, and one until the torque is written
 
 
 @dataclass
 class Odrive:
-    """What the firmware does in a cycle: the estimator of the encoder first, then position and velocity controller."""
+    """One cycle of the firmware: encoder estimator, then position and velocity controller."""
 
     encoder_bandwidth: float
     pos_gain: float
@@ -37,7 +37,7 @@ class Odrive:
     held: float = 0.0
 
     def cycle(self, wanted: float, turns: float) -> float:
-        """N m for an encoder that reads so many turns."""
+        """Torque in N m for an encoder reading in turns."""
         self.pos += PERIOD * self.vel
         off = turns - self.pos
         self.pos += PERIOD * 2.0 * self.encoder_bandwidth * off
@@ -61,14 +61,14 @@ def numbers(written: Exported) -> dict[str, float]:
 
 
 def told(written: Exported) -> tuple[float, float, float]:
-    """Crossover, Hz, phase margin, degrees, and gain margin, as the note has them."""
+    """Crossover, Hz, phase margin, degrees, and gain margin, from the note."""
     found = re.search(r"Crossover ([\d.]+) Hz; .*phase margin ([\d.]+) degrees, gain margin ([\d.]+\d)", written.note)
     assert found is not None
     return float(found[1]), float(found[2]), float(found[3])
 
 
 def response(own: dict[str, float], hertz: float) -> complex:
-    """N m over turns of the running controller, from an encoder that shows a sine, with the path at 0."""
+    """Frequency response of the running controller, N m per turn, for a sine of the encoder, with the path at 0."""
     drive, w = Odrive(**own), TURN * hertz
     whole = round(1.0 / (hertz * PERIOD)) * 20
     times = np.arange(3 * whole) * PERIOD
@@ -76,11 +76,11 @@ def response(own: dict[str, float], hertz: float) -> complex:
     wave = np.exp(-1j * w * times[-whole:])
     columns = np.column_stack((wave.real, wave.imag, np.ones(whole)))
     cosine, sine, _ = np.linalg.lstsq(columns, torque, rcond=None)[0]
-    return complex(cosine, sine) / -1j * -1.0  # torque = Re((cosine + j sine) e^jwt), the encoder Re(-j e^jwt); it counts against the error
+    return complex(cosine, sine) / -1j * -1.0  # torque = Re((cosine + j sine) e^jwt), the encoder Re(-j e^jwt); the error is minus the encoder
 
 
 def margins(controller: Mapping[float, complex], model: AxisModel) -> tuple[float, float, float]:
-    """Crossover, Hz, phase margin, degrees, and gain margin of an axis that is held for a cycle and written in the next; by frequency."""
+    """Crossover, Hz, phase margin, degrees, and gain margin of an axis with a hold of one cycle and output in the next, by frequency."""
     hertz = np.array(list(controller))
     s = 2j * np.pi * hertz
     axis = model.gain * model.pole / (s * (s + model.pole)) / TURN * np.exp(-s * (model.delay + 1.5 * PERIOD))
@@ -91,7 +91,7 @@ def margins(controller: Mapping[float, complex], model: AxisModel) -> tuple[floa
 
 
 def settles(own: Mapping[str, float], factor: float) -> bool:
-    """Whether the axis, with both gains of the velocity loop so many times as large, comes to rest after a step of a thousandth of a turn."""
+    """True if the axis comes to rest after a step of a thousandth of a turn, with both gains of the velocity loop multiplied."""
     drive = Odrive(**{**own, **{name: factor * own[name] for name in ("vel_gain", "vel_integrator_gain")}})
     keeps, fed = math.exp(-POLE * PERIOD), GAIN / TURN
     angle = speed = 0.0
@@ -107,7 +107,7 @@ def settles(own: Mapping[str, float], factor: float) -> bool:
 
 
 def test_every_sample_keeps_the_margins_that_are_told_under_odrives_own_controller(written: Exported) -> None:
-    """The frequency response of the controller that runs in turns gives the crossover, phase and gain margin of the note, estimator included."""
+    """The frequency response of the running controller, with its estimator, gives the crossover, phase and gain margin of the note."""
     controller = {float(hertz): response(numbers(written), float(hertz)) for hertz in np.geomspace(20.0, 300.0, 40)}
     model = known(units=UNITS, delay=0.05)
     found = np.array([margins(controller, item) for item in samples(model, 24)])

@@ -1,4 +1,4 @@
-"""Presliding friction while the axis rests: encoder noise makes the axis tremble, the friction relaxes, and the feedforward knows it."""
+"""Presliding friction at rest: encoder noise causes small motion, the friction relaxes, and the feedforward takes it into account."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from xy_sysid.control_design.path import Bounds, SampledPath, s_curve
 from xy_sysid.control_design.worth import encoder_of_floor
 
 RATE = 2000.0
-STIFF = Controller(kp=5000.0, ki=6e5, kd=10.0, derivative_time=2e-4, limit=10.0)  # as the rules of Ziegler and Nichols give it
+STIFF = Controller(kp=5000.0, ki=6e5, kd=10.0, derivative_time=2e-4, limit=10.0)  # by the rules of Ziegler and Nichols
 NOISY = Encoder(noise=1e-7, count=5e-7)
 
 
@@ -27,7 +27,7 @@ def path() -> SampledPath:
 
 
 def test_noise_shakes_a_resting_axis_and_no_noise_does_not() -> None:
-    """Mean absolute speed at rest grows with the noise; counts are noise of a twelfth of their square."""
+    """The mean absolute speed at rest grows with the noise; quantisation is noise with a variance of a twelfth of a squared count."""
     model = known("presliding_hysteresis").model
     speeds = [shake(model, 0.0, RATE, STIFF, Encoder(noise)) for noise in (0.0, 1e-7, 2e-7)]
     assert speeds[0] == 0.0 < speeds[1] < speeds[2]
@@ -35,7 +35,7 @@ def test_noise_shakes_a_resting_axis_and_no_noise_does_not() -> None:
 
 
 def test_the_feedforward_that_expects_the_shaking_leaves_a_third_of_the_error(path: SampledPath) -> None:
-    """Without it the spring of the friction is thought to be bent still when the axis sets off again."""
+    """Without the relaxation, the friction's spring would be assumed to be deflected at the next start."""
     model = known("presliding_hysteresis").model
     noise = shake(model, 0.0, RATE, STIFF, NOISY)
     errors = [follow_path(model, path, STIFF, feedforward(model, path, expected).voltage, NOISY, seed=5).rms for expected in (0.0, noise)]
@@ -49,7 +49,7 @@ def test_the_shaking_is_no_matter_where_nothing_remembers(path: SampledPath) -> 
 
 
 def test_the_compensation_undoes_presliding_friction_under_a_noisy_encoder(path: SampledPath) -> None:
-    """It is judged in simulation with the noise, and is worth a third of kS, kV and kA at most."""
+    """In simulation with the noise its error is at most a third of that with kS, kV and kA."""
     model = known("presliding_hysteresis")
     made = compensate((model.model,), gains(model), path, STIFF, NOISY)
     assert "presliding_hysteresis" in made.terms and made.chosen < made.simple / 3.0
@@ -65,7 +65,7 @@ def test_the_encoder_follows_from_a_noise_floor() -> None:
 
 
 def test_a_breakaway_that_no_sample_shows_is_not_relied_upon() -> None:
-    """Stribeck friction whose excess is gone within a sample may as well be Coulomb friction: the compensation has to be good for both."""
+    """Stribeck friction whose excess vanishes within a sample cannot be distinguished from Coulomb friction: the compensation must suit both."""
     seen, unseen = (replace(axis(), effects=(("stribeck_friction", (0.2, 0.1, speed)),)) for speed in (5e-3, 1e-6))
     assert alike(seen, RATE) == ()
     (other,) = alike(unseen, RATE)

@@ -1,4 +1,4 @@
-"""SDF in a program that is not ours: Drake, which reads it with the reference library of the format (libsdformat)."""
+"""SDF in an independent program: Drake, which reads it with the reference library of the format (libsdformat)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ tree = pytest.importorskip("pydrake.multibody.tree")
 
 
 def read(text: str) -> Any:
-    """Drake's model of an SDF text. Strict: Drake refuses what it warns of elsewhere."""
+    """Drake's model of an SDF text. Strict: warnings are errors."""
     plant = plants.MultibodyPlant(1e-3)
     parser = parsing.Parser(plant)
     parser.SetStrictParsing()
@@ -27,7 +27,7 @@ def read(text: str) -> Any:
 
 
 def test_drake_reads_mass_damping_limits_and_spring() -> None:
-    """The numbers of the model come out again: kA, kV, travel, largest force and speed, and the spring."""
+    """The numbers of the model are recovered: kA, kV, travel, largest force and speed, and the spring."""
     model = replace(axis(), effects=(("return_spring", (10.0, 0.002, 0.0)),))
     text, _ = sdf(model, (-0.02, 0.03), 5.0, angular=False)
     plant = read(text)
@@ -44,7 +44,7 @@ def test_drake_reads_mass_damping_limits_and_spring() -> None:
 
 @pytest.mark.parametrize("angular", [False, True])
 def test_drake_reads_the_sdf_of_every_effect(angular: bool) -> None:
-    """Comments that name what is lost, and odd numbers, do not spoil the file; the joint turns or slides as the axis does."""
+    """Comments about lost effects, and unusual numbers, keep the file valid; the joint type is that of the axis."""
     for effect in STANDARD.acting:
         text, lost = sdf(axis(effect.name), (-1.0, 1.0), 5.0, angular)
         joint = read(text).GetJointByName("axis_joint")

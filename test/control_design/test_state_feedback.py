@@ -28,7 +28,7 @@ def rigid() -> StateFeedback:
 
 
 def test_the_margins_hold_for_samples_that_were_not_designed_for(rigid: StateFeedback) -> None:
-    """Fresh samples of the intervals are stable, and the loop that this test closes by itself stays 0.45 away from -1 (a gain margin of 2 is 0.5)."""
+    """New samples of the intervals are stable, and the loop, closed independently here, stays 0.45 away from -1 (a gain margin of 2 is 0.5)."""
     frequency = np.geomspace(0.5, 0.499 * RATE, 2000)
     own = rigid.response(frequency)
     for item in samples(known(), 100)[30:]:
@@ -39,7 +39,7 @@ def test_the_margins_hold_for_samples_that_were_not_designed_for(rigid: StateFee
 
 
 def test_a_step_of_load_is_rejected_without_a_lasting_error(rigid: StateFeedback) -> None:
-    """The controller, run sample by sample against the plant, brings the error of a load of 1 V below a tenth after the time it tells, and to 0."""
+    """The controller with the plant, sample by sample, reduces the error of a load of 1 V below a tenth after the stated time, and to 0."""
     system = sampled(known().model, RATE)
     z, past = np.zeros(rigid.b.size), [0.0] * (system.whole + 2)
     x = np.zeros(system.old.size)
@@ -56,7 +56,7 @@ def test_a_step_of_load_is_rejected_without_a_lasting_error(rigid: StateFeedback
 
 
 def test_delay_and_resonance_limit_the_bandwidth(rigid: StateFeedback) -> None:
-    """Ten times the delay costs two thirds of the crossover; a bandwidth beyond that is refused with the margins that it would have."""
+    """Ten times the delay reduces the crossover by two thirds; a higher bandwidth gives an error with the resulting margins."""
     slow = replace(known(), model=axis(delay=12.9e-3), known=())
     assert state_feedback(slow, RATE).nominal.crossover < rigid.nominal.crossover / 3.0
     with pytest.raises(BadInput, match=r"phase margin|unstable"):
@@ -86,7 +86,7 @@ def test_c_and_python_run_as_the_design_does(rigid: StateFeedback, tmp_path: Pat
 
 
 def test_an_axis_that_coasts_is_held_at_a_bandwidth_of_its_pid() -> None:
-    """With hardly any drag the observer has to be fast for the margins: the bandwidth is that of the margins and not of the drag."""
+    """With hardly any drag the observer must be fast for the margins: the margins limit the bandwidth, not the drag."""
     model = known(delay=0.05)
     coasting = replace(model.model, gain=0.164, pole=2.24, delay=0.0)
     slow = replace(model, model=coasting, known=())
@@ -96,7 +96,7 @@ def test_an_axis_that_coasts_is_held_at_a_bandwidth_of_its_pid() -> None:
 
 
 def test_a_loop_across_an_open_gap_is_stable_with_the_motor_alone() -> None:
-    """Inside the gap the loop meets the motor's mass only, and keeps its margins there."""
+    """Inside the gap only the motor's mass is in the loop, which keeps its margins there."""
     model = known("backlash")
     found = state_feedback(model, RATE)
     assert found.bandwidth <= state_feedback(known(), RATE).bandwidth

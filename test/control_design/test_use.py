@@ -35,7 +35,7 @@ FIVE = [(name, ctypes.c_void_p) for name in ("allocate", "deallocate", "realloca
 
 @pytest.fixture(scope="module")
 def model() -> xy.PhysicalModel:
-    """Of a table with dry friction, from half a minute."""
+    """A table with dry friction, from half a minute."""
     return xy.refine(recorded("coulomb_friction=0.3", 12.0).run("x"), add=["coulomb_friction"], auto=False).model
 
 
@@ -60,13 +60,13 @@ def test_before_and_after_are_told_on_the_machines_own_recording(model: xy.Physi
 
 
 def test_a_model_without_intervals_is_used_with_a_warning() -> None:
-    """Nobody knows how sure its numbers are, and the answer says so."""
+    """Its numbers have no intervals, and the answer says so."""
     used = use(unknown("coulomb_friction"))
     assert "no intervals" in used.notes[0] and used.feedback is not None and used.feedback.count == 1
 
 
 def test_the_rate_is_that_of_the_models_recording_or_is_asked_for(tmp_path: Path, model: xy.PhysicalModel) -> None:
-    """A file carries the rate of the recording that its model was fitted to; where nobody knows it nothing is made up, and the travel is no other."""
+    """A file contains the rate of the recording of its model; if it is unknown, none is assumed, and the travel is unchanged."""
     file = tmp_path / "axes.yaml"
     for name, of in (("fitted", model), ("known", replace(known("cogging"), sampling_rate=500.0))):
         xy.save(of, file, force=True)
@@ -82,7 +82,7 @@ def test_the_rate_is_that_of_the_models_recording_or_is_asked_for(tmp_path: Path
 
 
 def test_an_axis_that_measures_its_speed_only_gets_feedforward_and_no_position_loop(tmp_path: Path) -> None:
-    """The integral of a speed drifts: no position loop, table by position or travel; a file says what was measured. Noise is that of the speed."""
+    """The integral of a speed drifts: no position loop, position table or travel; a file names the measured quantity. Noise is that of the speed."""
     run = recorded("coulomb_friction=0.3", 6.0, seed=77).run("x")
     speed = np.diff(run.position, prepend=run.position[0]) * run.sampling_rate + 5e-3 * np.random.default_rng(2).standard_normal(len(run))
     fast = replace(run, position=np.cumsum(speed) / run.sampling_rate, measured="velocity")
@@ -101,7 +101,7 @@ def test_an_axis_that_measures_its_speed_only_gets_feedforward_and_no_position_l
 
 
 def test_what_cannot_be_designed_safely_is_refused_and_the_rest_is_told() -> None:
-    """An undetermined gain makes no controller; the gains are marked; tables are still there."""
+    """An undetermined gain gives no controller; the gains are marked; tables are still written."""
     used = use(known("cogging", gain=0.9), limit=5.0, travel=TRAVEL)
     assert used.feedback is None and not used.tracking
     assert dict(used.refused)["feedback"].startswith("gain is known to worse than a factor of two")
@@ -109,7 +109,7 @@ def test_what_cannot_be_designed_safely_is_refused_and_the_rest_is_told() -> Non
 
 
 def test_backlash_becomes_a_correction_by_direction() -> None:
-    """The gap with its interval, and how it is used."""
+    """The gap with its interval, and its use."""
     used = use(known("backlash"))
     assert used.gap is not None and used.gap.value == pytest.approx(20e-6) and "half of it" in used.gap.meaning
     assert dict(used.not_undone)["backlash"]
@@ -124,13 +124,13 @@ def test_backlash_becomes_a_correction_by_direction() -> None:
     ],
 )
 def test_values_out_of_range_are_refused_in_one_line(values: dict[str, Any], words: str) -> None:
-    """What was given, what is allowed, what to do."""
+    """The given value, the allowed values, the next action."""
     with pytest.raises(xy.BadInput, match=words):
         use(known(), **values)  # a wrong value on purpose
 
 
 def test_a_transfer_function_is_refused() -> None:
-    """Only a model with physical effects knows friction, limits and places."""
+    """Only a model with physical effects has friction, limits and positions."""
     linear = xy.LinearModel(known().tf)
     with pytest.raises(xy.BadInput, match="a model with physical effects"):
         use(linear)  # a wrong type on purpose
@@ -156,7 +156,7 @@ def test_a_ros2_control_snippet_is_yaml_with_the_names_of_pid_controller() -> No
 
 @pytest.mark.parametrize("name", ["y", "no", "1", "it's"])
 def test_the_parser_of_ros_2_reads_an_axis_name_as_text(name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """rcl reads a plain y as true and 1 as an integer; in quotes each is a name, in the list of joints and in the gains."""
+    """rcl reads a plain y as true and 1 as an integer; quoted, each is a name, in the list of joints and in the gains."""
     file = tmp_path / "controllers.yaml"
     (text,) = export(use(replace(known(), axis=name)), "ros2_control").files.values()
     file.write_text(text)
@@ -200,7 +200,7 @@ def test_a_linuxcnc_snippet_is_hal_commands_with_the_pins_of_pid() -> None:
 
 
 def test_a_rotary_axis_of_linuxcnc_is_in_degrees() -> None:
-    """What moves it by 1 rad/s moves it by 57.3 degrees/s; the note gives the angle of an arm in degrees, too."""
+    """An input for 1 rad/s is that for 57.3 degrees/s; the note also gives the angle of an arm in degrees."""
     used = use(known("gravity", units=Units("V", "rad")), limit=5.0)
     made = export(used, "linuxcnc")
     (text,) = made.files.values()
@@ -211,7 +211,7 @@ def test_a_rotary_axis_of_linuxcnc_is_in_degrees() -> None:
 
 
 def test_a_klipper_snippet_of_another_axis_says_so() -> None:
-    """Shapers are of x and y: any other axis is written as x, in the text and in the note."""
+    """Shapers exist for x and y only: any other axis is written as x, in the text and in the note."""
     made = export(use(replace(known("base_resonance"), axis="gantry")), "klipper")
     (text,) = made.files.values()
     assert text.startswith("# of axis 'gantry', written as x\n[input_shaper]\n") and "the axis is 'gantry'" in made.note
@@ -219,7 +219,7 @@ def test_a_klipper_snippet_of_another_axis_says_so() -> None:
 
 
 def test_an_odrive_snippet_is_python_in_turns() -> None:
-    """Assignments that odrivetool takes; an axis in volts is refused, as ODrive commands a torque."""
+    """Assignments for odrivetool; an axis in volts is refused, because ODrive commands a torque."""
     (text,) = export(use(known("coulomb_friction", units=Units("N m", "rad"))), "odrive").files.values()
     targets = [ast.unparse(node.targets[0]) for node in ast.parse(text).body if isinstance(node, ast.Assign)]
     gains = [f"controller.config.{name}" for name in ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia")]
@@ -251,7 +251,7 @@ def test_a_twincat_program_is_parsed_by_blark_with_the_fields_of_fb_ctrl_pid() -
 
 
 def test_the_twincat_program_keeps_the_sum_of_feedback_and_feedforward_within_the_limit() -> None:
-    """Run with a block that stops at its limits, as FB_CTRL_PID does: no sum leaves the limit, and the block has all that the feedforward leaves."""
+    """With a block that stops at its limits, like FB_CTRL_PID: no sum exceeds the limit, and the block gets the rest beside the feedforward."""
     used = use(known("coulomb_friction"), rate=1000.0, limit=5.0)
     (text,) = export(used, "twincat").files.values()
     body = text.rsplit("END_VAR\n\n", 1)[1].split("END_PROGRAM")[0]
@@ -279,7 +279,7 @@ def test_the_twincat_program_keeps_the_sum_of_feedback_and_feedforward_within_th
 
 
 def test_a_gain_that_the_data_do_not_determine_is_exported_as_0_and_named() -> None:
-    """kS whose interval holds 0 is no number for a controller; an angle and a model without intervals keep theirs, as 0 would be no better."""
+    """kS with an interval that contains 0 is not written; an angle, and a model without intervals, keep their values, since 0 would not be better."""
     unsure = use(known("coulomb_friction", coulomb_friction__coulomb=1.5), rate=1000.0, limit=5.0)
     assert unsure.gains["kS"].low < 0.0 < unsure.gains["kS"].value and unsure.gains.value("kS") == 0.0
     assert "fKS : LREAL := 0.000000000E+00; (* V, not determined by the data *)" in export(unsure, "twincat").files["x_twincat_axis.st"]
@@ -295,7 +295,7 @@ def test_a_gain_that_the_data_do_not_determine_is_exported_as_0_and_named() -> N
 
 
 def test_exported_source_undoes_what_is_predicted_to_help() -> None:
-    """The laws that the compensation leaves are left by the exported feedforward, too, and the note names them."""
+    """The exported feedforward omits the same laws as the compensation, and the note names them."""
     models = known("cogging"), known("cogging", cogging__phase=40.0, cogging__amplitude=2.0)
     sure, unsure = (use(model, limit=5.0, travel=TRAVEL) for model in models)
     assert sure.compensation is not None and sure.compensation.terms == ("base", "cogging")
@@ -319,7 +319,7 @@ def test_exported_source_undoes_what_is_predicted_to_help() -> None:
 
 
 def test_margins_that_are_asked_for_are_kept() -> None:
-    """More phase costs bandwidth; margins out of range are refused with the allowed range."""
+    """A larger phase margin reduces the bandwidth; margins out of range are refused with the allowed range."""
     usual, more = use(known("base_resonance")), use(known("base_resonance"), margins=(55.0, 3.0))
     assert usual.feedback is not None and more.feedback is not None and more.states is not None
     assert more.feedback.worst.phase >= 55.0 and more.feedback.worst.gain >= 3.0 and more.feedback.crossover < usual.feedback.crossover
@@ -345,7 +345,7 @@ def test_the_command_tells_gains_and_writes_files(tmp_path: Path, model: xy.Phys
 
 
 def test_an_unknown_target_or_a_linear_model_is_refused_in_one_line(tmp_path: Path, model: xy.PhysicalModel) -> None:
-    """With the nearest spelling, or with what to do."""
+    """The error gives the nearest spelling, or the next action."""
     file = tmp_path / "axes.yaml"
     xy.save(model, file)
     assert "klipper" in refused("use", file, "--to", "kliper")

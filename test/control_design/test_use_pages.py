@@ -1,4 +1,4 @@
-"""docs/use.md and the tutorial: their commands run, their figures come out, their tables name what there is."""
+"""docs/use.md and the tutorial: their commands run and give the stated numbers, and their tables are complete."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ PAGE, TUTORIAL = (ROOT / "docs" / name for name in ("use.md", "csv-to-numbers.md
 
 
 def test_the_table_of_exports_names_every_target() -> None:
-    """A target is in the table, and each that the table names is there."""
+    """Every target is in the table, and every one in the table exists."""
     told = re.findall(r"^\| `(\w+)` \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
     assert sorted(told) == sorted(TARGETS)
 
 
 def test_the_tutorial_leads_from_a_csv_to_pasted_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its script and its commands run in order; kS, kV and kA are those that it shows, to three digits."""
+    """Its script and its commands run in order; kS, kV and kA are the stated ones, to three digits."""
     monkeypatch.chdir(tmp_path)
     page = TUTORIAL.read_text(encoding="utf-8")
     exec(page.split("```python\n")[1].split("```")[0], {})

@@ -1,4 +1,4 @@
-"""What is named does not depend on how busy the computer is."""
+"""The diagnosis does not depend on the load of the computer."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def run() -> Run:
 
 
 def test_a_computer_that_stands_still_between_two_steps_gives_the_same_answer(run: Run) -> None:
-    """A clock that leaps by an hour each time it is asked, and one that stands: the same document, unless somebody gave a budget."""
+    """A clock that advances by an hour at each reading, and a stopped one, give the same document without a budget."""
     hours = count(0, 3600)
     slow, quick = diagnose(run, clock=lambda: float(next(hours))), diagnose(run)
     assert answer_document(slow) == answer_document(quick) and not slow.stopped
@@ -30,12 +30,12 @@ def test_a_computer_that_stands_still_between_two_steps_gives_the_same_answer(ru
 
 
 def test_wherever_the_time_is_up_an_answer_comes() -> None:
-    """A gap with friction and a spring, where every kind of trial has its turn: a budget that ends at any of them ends with a verdict."""
+    """A gap with friction and a spring, which needs every kind of trial: a budget that ends at any of them gives a verdict."""
     gap = recorded("backlash+coulomb_friction+return_spring", seconds=4.0).run("x")
     looks: list[int] = []
 
     def clock() -> float:
-        """Each look at it takes a second."""
+        """A clock that advances by a second at each reading."""
         looks.append(1)
         return float(len(looks))
 

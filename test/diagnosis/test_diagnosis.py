@@ -1,4 +1,4 @@
-"""Naming the missing effect on the simulated machine, whose physics and numerics are others; and saying so when nothing fits."""
+"""The missing effect is named on the simulated machine, which has other physics code and numerics; if none fits, the answer says so."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def diagnosed(effect: str, seconds: float = 20.0) -> Answer:
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
 def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: str) -> None:
-    """First name right, held-out error within 5 % of the noise, confident; nearly all of the error's power explained, and that is said."""
+    """The first name is right and confident, the held-out error within 5 % of the noise, and nearly all of the error's power is explained."""
     found = diagnosed(effect, 30.0)
     assert (found.verdict, found.effects) == ("missing_effect", (effect,))
     assert found.final.held_out_error < 1.05 * found.final.noise_floor
@@ -58,7 +58,7 @@ def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: st
 
 @cache
 def two_effects() -> tuple[Answer, int]:
-    """The answer for an axis with two effects, and how often the search looked at its clock."""
+    """The answer for an axis with two effects, and how often the search read its clock."""
     ticks = count()
     found = diagnose(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"), clock=partial(next, ticks))
     return found, next(ticks)
@@ -72,7 +72,7 @@ def test_two_effects_are_both_named() -> None:
 
 
 def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
-    """Of an axis with one effect and something beside that no law has: the effect, what it explains, and what it does not."""
+    """For an axis with one effect and an unknown disturbance: the effect, and the explained and residual error."""
     found = diagnosed("coulomb_friction+thermal_viscosity")
     assert (found.verdict, found.effects[0]) == ("missing_effect", "coulomb_friction")
     assert found.sentence.startswith("Missing: coulomb_friction") and " of the error's power (" in found.sentence
@@ -83,7 +83,7 @@ def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "backlash"])
 def test_words_for_people_steer_no_search(effect: str) -> None:
-    """A library whose effects look like nothing finds the same, with the same confidence and in the same words."""
+    """A library whose effects have no look-alikes gives the same result, with the same confidence and in the same words."""
     u, y = recorded(effect, seconds=20.0).axis("x")
     found, told = diagnosed(effect), diagnose(2000.0, u, y, Library([replace(item, look_alikes=()) for item in EFFECTS.values()]))
     assert (found.verdict, found.effects) == ("missing_effect", (effect,))
@@ -92,7 +92,7 @@ def test_words_for_people_steer_no_search(effect: str) -> None:
 
 @pytest.mark.parametrize("effect", ["coulomb_friction=0.001", "dead_zone=0.002"])
 def test_an_effect_in_the_noise_is_not_named_with_confidence(effect: str) -> None:
-    """The base is at the floor; whether or not the right name is said, it is no certainty, and no other name is said."""
+    """The base is at the floor; if the right name is given, then without certainty, and no other name is given."""
     found = diagnose(2000.0, *recorded(effect).axis("x"))
     assert found.base.excess < AT_FLOOR
     if found.verdict == "nothing_missing":
@@ -103,21 +103,21 @@ def test_an_effect_in_the_noise_is_not_named_with_confidence(effect: str) -> Non
 
 
 def nothing_left(data: AxisData) -> Answer:
-    """The verdict where excess and discrepancy are exactly 0."""
+    """The verdict if excess and discrepancy are exactly 0."""
     ladder = refine(data)
     base = replace(ladder.base, excess=0.0)
     return judged(data, replace(ladder, rungs=(Rung.of(base),), best=(), discrepancy=0.0), STANDARD)
 
 
 def test_a_base_without_any_excess_is_no_division_by_zero() -> None:
-    """Nothing is missing, and it is said what the noise could hide."""
+    """Nothing is missing, and the answer states what the noise could hide."""
     found = nothing_left(prepare(2000.0, *recorded("").axis("x")))
     assert (found.verdict, found.tolerance) == ("nothing_missing", 0.0)
     assert "An effect that changes the motion by less than 0." in found.sentence
 
 
 def test_that_nothing_is_missing_is_as_sure_as_the_noise_lets_one_see() -> None:
-    """The quieter the encoder, the fewer sizes of an effect could hide; what laws are not trusted to is no effect."""
+    """With less encoder noise, only smaller effects can be hidden; the tolerated part of the motion is not an effect."""
     voltage, position = recorded("").axis("x")
     rng = np.random.default_rng(1)
     noises = (3e-6, 1e-6, 0.0)
@@ -153,7 +153,7 @@ def test_what_is_not_in_the_library_is_not_named() -> None:
     ],
 )
 def test_what_is_lacking_in_the_data_is_said(u: np.ndarray, y: np.ndarray, words: str) -> None:
-    """Too short, not excited, standing still: each in words."""
+    """Too short, not excited, at rest: each with its reason."""
     found = diagnose(2000.0, u, y)
     assert found.verdict == "not_enough_data"
     assert words in found.sentence
@@ -161,7 +161,7 @@ def test_what_is_lacking_in_the_data_is_said(u: np.ndarray, y: np.ndarray, words
 
 @pytest.mark.parametrize("samples", [300, 40_000])
 def test_one_sine_is_too_little_to_name_anything(samples: int) -> None:
-    """Any law has two numbers to fit its size and its phase."""
+    """Any law can fit size and phase with two parameters."""
     found = diagnose(2000.0, np.sin(np.arange(samples)), np.cos(np.arange(samples)))
     assert found.verdict == "not_enough_data"
 
@@ -205,7 +205,7 @@ def test_refine_writes_the_ladder_and_the_model(rec: Path, tmp_path: Path, capsy
 
 
 def test_an_effect_can_be_added_by_name(rec: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Right or wrong: the ladder tells; a name that nobody knows is refused with the nearest."""
+    """A right or a wrong effect: the errors show it; an unknown name is refused with the nearest spelling."""
     assert run(["refine", str(rec), "--add", "cogging", "-a", "x", "--json"]) == 0
     x = json.loads(capsys.readouterr().out)["axes"]["x"]
     assert [rung["added"] for rung in x["ladder"]] == [None, "cogging"]
@@ -216,7 +216,7 @@ def test_an_effect_can_be_added_by_name(rec: Path, capsys: pytest.CaptureFixture
 
 
 def test_what_is_compiled_at_first_use_costs_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a fresh machine the first fit compiles the laws for longer than the whole budget: the search has its time all the same."""
+    """On a new computer the first fit compiles the laws for longer than the budget: the search still gets its time."""
     now = [0.0]
 
     def slow(data: AxisData, library: Library) -> GreyboxFit:
@@ -229,16 +229,16 @@ def test_what_is_compiled_at_first_use_costs_no_budget(monkeypatch: pytest.Monke
 
 
 def test_a_part_that_rattles_is_no_mode_with_confidence() -> None:
-    """The mode explains most of the error and leaves some; a true mode of the same strength leaves none."""
+    """The mode explains most of the error, but not all; a true mode of the same strength explains all."""
     rattles, rings = (diagnosed(name) for name in ("loose_mode", "base_resonance"))
     assert rattles.effect is None or rattles.confidence < 0.9
     assert rings.effects == ("base_resonance",)
     likely = likelihood(STANDARD, "base_resonance", dict(rings.final.model.effects)["base_resonance"])
-    assert 0.9 < rings.confidence <= likely < 1.0  # a motor encoder cannot tell it from a screw that gives
+    assert 0.9 < rings.confidence <= likely < 1.0  # a motor encoder cannot distinguish it from a flexible screw
 
 
 def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
-    """An effect may hide in it, or in the noise; and what some set takes away is no longer nowhere."""
+    """An effect may be hidden in it, or in the noise; an error that some set explains is not unexplained."""
     data, ladder = prepare(2000.0, *recorded("quadratic_drag", seconds=20.0).axis("x")), diagnosed("quadratic_drag")
     nothing = replace(ladder, best=(), explained=0.0, helps=0.0)
     motion = data.layout.rms(data.floor.motion)
@@ -249,7 +249,7 @@ def test_not_in_the_library_is_said_less_surely_the_more_is_left() -> None:
 
 
 def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
-    """A tie between a load and cogging beside friction: friction alone is told, and the load as what may be; a rival of friction itself counts."""
+    """A tie between a load and cogging, with friction: only friction is named, and the load as possible; a rival of friction itself counts."""
     data, alone = prepare(2000.0, *recorded("coulomb_friction", seconds=20.0).axis("x")), diagnosed("coulomb_friction")
     both = fit_with(data, alone.final, ["constant_load"])
     tie = Tried(Rung.of(both, ("coulomb_friction", "cogging")), doubt=0.5)
@@ -267,12 +267,12 @@ def test_what_two_sets_share_is_named_and_what_they_differ_in_is_not() -> None:
     assert found.final is alone.final
     assert tie not in found.rivals
     unsure = judged(data, replace(ladder, rivals=(Tried(Rung.of(both, ("cogging",)), doubt=0.5),)), STANDARD)
-    assert unsure.effects == ("coulomb_friction",)  # no surer than not, but the load explains nothing more
+    assert unsure.effects == ("coulomb_friction",)  # below 50 %, but the load explains nothing in addition
     assert unsure.confidence < 0.5
 
 
 def ending(fit: GreyboxFit, value: float, low: float, high: float) -> GreyboxFit:
-    """A fit whose load comes out so, V."""
+    """A fit with this load, V."""
     load = replace(fit.parameter("constant_load.load"), value=value, low=low, high=high)
     parameters = tuple(load if item.name == load.name else item for item in fit.parameters)
     return replace(fit, model=fit.model.with_effect("constant_load", (value,)), parameters=parameters)
@@ -283,7 +283,7 @@ def ending(fit: GreyboxFit, value: float, low: float, high: float) -> GreyboxFit
     [(-0.2, -0.25, -0.15, False), (0.2, -0.1, 0.5, True), (0.2, 0.05, 0.35, True), (-1.0, -1.1, -0.9, True), (1.0, 0.9, 1.1, True)],
 )
 def test_a_size_that_is_not_known_or_ends_at_a_bound_is_half_sure_at_most(value: float, low: float, high: float, half: bool) -> None:
-    """Whether it is so in the fit that is told, or beside what is not told; a size with a sign has two bounds. A value of 1 stands for its bound."""
+    """In the reported fit, or in a candidate; a signed size has two bounds. A value of 1 represents its bound."""
     data, alone = prepare(2000.0, *recorded("constant_load", seconds=20.0).axis("x")), diagnosed("constant_load")
     bound = STANDARD["constant_load"].on(data.similar)[0].high
     size = (value, low, high) if abs(value) < 1.0 else (value * bound, low * bound, high * bound)
@@ -300,7 +300,7 @@ def test_a_size_that_is_not_known_or_ends_at_a_bound_is_half_sure_at_most(value:
 
 
 def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure() -> None:
-    """It is no spring, but neither is it surely that wave; other refused sets, and relatives, are no rivals."""
+    """It is not a spring, but not certainly that wave either; other refused sets, and related effects, are no rivals."""
     wave, spring, stiff = (frozenset({"coulomb_friction", name}) for name in ("cogging", "return_spring", "hardening_stiffness"))
     assert is_mistaken_for(STANDARD, spring, wave)
     assert not is_mistaken_for(STANDARD, wave, spring)
@@ -314,7 +314,7 @@ def test_a_refused_spring_that_leaves_as_little_as_a_wave_makes_the_wave_unsure(
 
 
 def test_effects_come_in_the_order_of_what_each_would_cost() -> None:
-    """By the best set known without it, so that there is an answer where the time left no fit without it, too."""
+    """Compared with the best known set without it, so that there is an answer even if time allowed no fit without it."""
     data = prepare(2000.0, *recorded("coulomb_friction+cogging", seconds=20.0).axis("x"))
     found, ticks = two_effects()
     ladders = (found, refine(data, effort=Effort(budget=0.3 * ticks, clock=partial(next, count()))))
@@ -327,7 +327,7 @@ def test_effects_come_in_the_order_of_what_each_would_cost() -> None:
 
 
 def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> None:
-    """A machine of plain Euler steps: what stands back for a law that does the same is left out, and the law that is there stays."""
+    """A machine with Euler steps: an effect equivalent to another law is left out, and the true law stays."""
     rate, sub = 1000.0, 10
     rng = np.random.default_rng(8)
     voltage = scipy.signal.sosfilt(scipy.signal.butter(4, [0.3, 80.0], "band", fs=rate, output="sos"), rng.normal(size=40_000))
@@ -351,7 +351,7 @@ def test_a_spring_beside_friction_is_not_taken_for_a_pendulum_and_bumps() -> Non
 
 @pytest.mark.parametrize("effect", ["backlash", "base_resonance+thermal_viscosity"])
 def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One that explains the axis ends the simulations; one that does not is not fitted again beside the same effects."""
+    """A one-step fit that explains the axis ends the simulations; one that does not is not repeated with the same effects."""
     asked: list[tuple[str, ...]] = []
     fitted = extended
 
@@ -371,7 +371,7 @@ def test_a_gap_is_asked_for_early_and_once(effect: str, monkeypatch: pytest.Monk
 
 
 def test_a_gap_that_is_too_small_to_be_one_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However well the filter does with it."""
+    """Even if the filter predicts well with it."""
     fitted = extended
 
     def too_small(data: AxisData, base: GreyboxFit, gap: Effect, *others: Any) -> Any:
@@ -384,7 +384,7 @@ def test_a_gap_that_is_too_small_to_be_one_is_not_named(monkeypatch: pytest.Monk
 
 
 def test_a_gap_of_little_more_than_a_count_is_no_soft_screw() -> None:
-    """Free simulations call it a compliance; beyond the noise, the filter that knows the gap leaves half of what it leaves without."""
+    """Free simulation suggests a compliance; above the noise, the filter with the gap has half the error of that without."""
     found = diagnose(2000.0, *recorded("coulomb_friction=0.03+backlash=1.2e-6", seconds=20.0, counts=5000.0).axis("x"))
     assert set(found.effects) == {"backlash", "coulomb_friction"}
     gap, load = (found.final.parameter(name) for name in ("backlash.gap", "coulomb_friction.coulomb"))
@@ -393,14 +393,14 @@ def test_a_gap_of_little_more_than_a_count_is_no_soft_screw() -> None:
 
 
 def test_what_acts_beside_a_gap_is_asked_for_though_it_was_known_beside_a_screw_only() -> None:
-    """A compliance is the best simulation: the gap is tried with the lag that it hides."""
+    """A compliance is the best simulation: the gap is tested together with the lag that it masks."""
     found = diagnose(2000.0, *recorded("amplifier_lag=0.002+coulomb_friction=0.02+backlash=2e-6", seconds=20.0, counts=5000.0).axis("x"))
     assert set(found.effects) == {"backlash", "coulomb_friction", "amplifier_lag"}
     assert found.final.one_step
 
 
 def test_what_a_simulation_had_taken_a_gap_for_goes() -> None:
-    """A lag, here, of no size once the gap is known: it is taken out of what the filter has beside it."""
+    """A lag whose size is zero with the gap is removed from the filter's companions."""
     data = prepare(2000.0, *recorded("coulomb_friction=0.03+backlash=6e-6", seconds=10.0).axis("x"))
     base = fit_with(data, fit_base(data), ["amplifier_lag"])
     fit = extended(data, base, EFFECTS["backlash"]).rungs[-1][1]
@@ -408,7 +408,7 @@ def test_what_a_simulation_had_taken_a_gap_for_goes() -> None:
 
 
 def test_a_gap_beside_a_large_force_is_asked_for_with_that_force() -> None:
-    """Cogging that a simulation without the gap has found stands beside it: alone, the gap does not do better than the cogging."""
+    """Cogging found by a simulation without the gap is kept: alone, the gap is not better."""
     found = refine(prepare(2000.0, *recorded("backlash=14e-6+coulomb_friction=0.08+cogging=0.5,per_revolution=4").axis("x")))
     assert set(found.effects) == {"backlash", "coulomb_friction", "cogging"}
     assert [rung.added for rung in found.rungs][:2] == [None, "cogging"] and found.final.excess == 0.0

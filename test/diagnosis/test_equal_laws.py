@@ -1,4 +1,4 @@
-"""Two effects of one law: which name is said, and how sure that is."""
+"""Two effects with the same equations: the given name, and its confidence."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TWO_INERTIAS = (0.41, 54.0, 0.02, 0.03)
 
 
 def test_a_base_and_a_screw_that_give_are_one_law() -> None:
-    """And no other two effects of the library are."""
+    """No other two effects of the library have the same equations."""
     assert {effect.name for effect in equals(STANDARD, "base_resonance")} == {"base_resonance", "screw_compliance"}
     alone = [effect.name for effect in STANDARD.acting if len(equals(STANDARD, effect.name)) == 1]
     assert len(alone) == len(STANDARD.acting) - 2
@@ -26,14 +26,14 @@ def test_a_base_and_a_screw_that_give_are_one_law() -> None:
     ("values", "likely"), [(HEAVY_BASE, "base_resonance"), (TWO_INERTIAS, "screw_compliance"), ((0.1, 140.0, 0.02, 0.05), "screw_compliance")]
 )
 def test_the_likelier_name_is_that_of_which_it_is_usual(values: tuple[float, ...], likely: str) -> None:
-    """A base is slow and heavy; where the resonance is far above the antiresonance, two parts of like inertia swing."""
+    """A base is slow and heavy; if the resonance is far above the antiresonance, two parts of similar inertia oscillate."""
     both = {effect.name: likelihood(STANDARD, effect.name, values) for effect in equals(STANDARD, likely)}
     assert sum(both.values()) == pytest.approx(1.0)
     assert max(both, key=lambda name: both[name]) == likely
 
 
 def test_what_no_other_effect_does_has_its_name_for_sure() -> None:
-    """Whatever its size."""
+    """For any size."""
     assert likelihood(STANDARD, "coulomb_friction", (0.0,)) == 1.0
 
 

@@ -1,4 +1,4 @@
-"""The answer on machines of another make: with a controller around them, with springs off their rest, on a part of a wave."""
+"""The answer on independently simulated machines: in closed loop, with preloaded springs, on part of a wave."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def values(found: Answer) -> dict[str, tuple[float, ...]]:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_linear_motor_in_closed_loop_has_cogging_and_friction(seed: int) -> None:
-    """It stops and starts at each move, so that what friction changes is linear in its size at low frequencies alone."""
+    """It stops and starts at each move, so that the effect of friction is linear in its size only at low frequencies."""
     found = of(LINEAR_MOTOR, seed)
     assert set(found.effects) == {"coulomb_friction", "cogging"}, found.sentence
     assert found.confidence > 0.9
@@ -64,7 +64,7 @@ def test_a_linear_motor_in_closed_loop_has_cogging_and_friction(seed: int) -> No
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_robots_joint_that_breaks_away_has_stribeck_friction(seed: int) -> None:
-    """Moves and pauses alone, without noise in the drive; what was settled on first may be another law of friction."""
+    """Only moves and pauses, without noise in the drive; the first choice may be another law of friction."""
     found = of(ROBOT, seed)
     assert found.effects == ("stribeck_friction",), found.sentence
     assert found.confidence > 0.9
@@ -72,7 +72,7 @@ def test_a_robots_joint_that_breaks_away_has_stribeck_friction(seed: int) -> Non
 
 
 def test_a_load_on_a_linear_motor_does_not_hide_its_cogging() -> None:
-    """Friction and load lead the base astray, so that the cogging's trace tells nothing; by least squares with the friction it stands out."""
+    """Friction and load bias the base, so that the cogging's trace is not visible; least squares with the friction shows it."""
     found = of(replace(LINEAR_MOTOR, load=3.0))
     assert set(found.effects) == {"asymmetric_friction", "cogging"}, found.sentence
     assert found.confidence > 0.9
@@ -80,7 +80,7 @@ def test_a_load_on_a_linear_motor_does_not_hide_its_cogging() -> None:
 
 
 def test_heavy_friction_does_not_hide_that_it_breaks_away() -> None:
-    """The part that breaks away is a seventh of all: the first start leads elsewhere, that of its trace does not."""
+    """The breakaway part is a seventh of the friction: the first start leads to another minimum, that of its trace does not."""
     found = of(replace(ROBOT, coulomb=2.0))
     assert found.effects == ("stribeck_friction",), found.sentence
     assert values(found)["stribeck_friction"] == pytest.approx((2.0, 0.3, 0.05), rel=0.02)
@@ -88,7 +88,7 @@ def test_heavy_friction_does_not_hide_that_it_breaks_away() -> None:
 
 @pytest.mark.parametrize(("breaks", "effects"), [(0.0, {"saturation", "coulomb_friction"}), (5.0, {"saturation", "stribeck_friction"})])
 def test_a_drive_that_is_at_its_limit_for_half_of_the_time_is_told_from_a_slow_axis(breaks: float, effects: set[str]) -> None:
-    """A controller asks for far more than there is; a rigid base fitted to that has nothing of the axis, so that no trace tells."""
+    """A controller requests far more than the limit; a rigid base fitted to these requests is wrong, so that no trace is useful."""
     joint = replace(LINEAR_MOTOR, cogging=0.0, breaks=breaks, fades=0.13, limit=60.0)
     assert 0.2 < float(np.mean(np.abs(driven(joint, 1)[0]) > joint.limit)) < 0.6
     found = of(joint)
@@ -98,7 +98,7 @@ def test_a_drive_that_is_at_its_limit_for_half_of_the_time_is_told_from_a_slow_a
 
 
 def test_a_zone_of_the_drive_in_which_nothing_happens_is_told_beside_friction() -> None:
-    """Both hold the axis at small drives; the zone takes from every drive, friction from the speed."""
+    """Both hold the axis at small inputs; the zone reduces every input, friction acts against the motion."""
     found = of(replace(SLIDE, coulomb=0.3, zone=0.3, shake=2.0, band=(0.5, 40.0)))
     assert set(found.effects) == {"coulomb_friction", "dead_zone"}, found.sentence
     own = values(found)
@@ -106,7 +106,7 @@ def test_a_zone_of_the_drive_in_which_nothing_happens_is_told_beside_friction() 
 
 
 def test_in_a_move_that_passes_each_place_once_nothing_is_named_by_place() -> None:
-    """Speeds one way, with friction that slowly changes: a drag by place would say the same, and nobody can tell."""
+    """Motion in one direction, with slowly changing friction: a position-dependent drag cannot be distinguished from it."""
     joint = Joint(fs=1000.0, seconds=20.0, count=1e-4, mass=0.1, drag=1.0, coulomb=0.3, shake=0.4, band=(0.2, 20.0), offset=2.0)
     drive, position = driven(joint, 4)
     assert np.all(np.diff(position[:: int(joint.fs / 5.0)]) > 0.0)
@@ -115,7 +115,7 @@ def test_in_a_move_that_passes_each_place_once_nothing_is_named_by_place() -> No
 
 
 def test_a_spring_beside_friction_that_breaks_away_is_not_one_that_stiffens() -> None:
-    """Hardening stiffness beside it leaves nothing, and is refused: the return spring is tried in its place."""
+    """With hardening stiffness in addition the error is at the floor, but the set is refused: the return spring is tested instead."""
     found = of(replace(SLIDE, spring=100.0, coulomb=0.2, breaks=0.1, fades=0.01), seed=2)
     assert set(found.effects) == {"return_spring", "stribeck_friction"}, found.sentence
 
@@ -124,7 +124,7 @@ def test_a_spring_beside_friction_that_breaks_away_is_not_one_that_stiffens() ->
     ("gap", "table", "coulomb"), [(1e-4, 0.1, 0.0), (1e-4, 0.1, 0.15), (3e-5, 0.1, 0.15), (3e-4, 0.03, 0.15), (3e-4, 0.1, 0.15), (3e-4, 0.3, 0.0)]
 )
 def test_a_gap_before_a_table_that_drags_is_found(gap: float, table: float, coulomb: float) -> None:
-    """Half of the drag is the table's, as guides are; the base has taken the delay for something else. Light tables and heavy ones."""
+    """Half of the drag is the table's, as for guides; the base has a wrong delay. Light tables and heavy ones."""
     found = diagnose(2000.0, *across_gap(gap, table, coulomb, 1))
     assert set(found.effects) == {"backlash"} | ({"coulomb_friction"} if coulomb else set()), found.sentence
     assert values(found)["backlash"][0] == pytest.approx(gap, rel=0.1)
@@ -134,7 +134,7 @@ def test_a_gap_before_a_table_that_drags_is_found(gap: float, table: float, coul
     ("gap", "table", "coulomb", "lag", "load"), [(1e-4, 0.1, 0.15, 2e-3, 0.0), (3e-4, 0.05, 0.1, 2e-3, 0.05), (3e-4, 0.1, 0.0, 3e-3, 0.1)]
 )
 def test_what_a_gap_hides_is_found_with_it(gap: float, table: float, coulomb: float, lag: float, load: float) -> None:
-    """An amplifier that lags leaves no trace before a gap, and without it no filter follows the motor; a load pulls on the table."""
+    """An amplifier lag has no trace before a gap, and without it no filter follows the motor; a load acts on the table."""
     found = diagnose(2000.0, *across_gap(gap, table, coulomb, 1, lag=lag, load=load))
     true = {"backlash": gap, "amplifier_lag": lag, "coulomb_friction": coulomb, "constant_load": load}
     assert set(found.effects) == {name for name, size in true.items() if size}, found.sentence
@@ -144,17 +144,17 @@ def test_what_a_gap_hides_is_found_with_it(gap: float, table: float, coulomb: fl
 
 @pytest.mark.parametrize("coulomb", [0.0, 0.2])
 def test_a_spring_whose_rest_is_far_off_is_one_spring(coulomb: float) -> None:
-    """A valve's: preloaded by five times its travel, which the drive holds."""
+    """The spring of a valve: preloaded by five times its travel, held by the drive."""
     found = of(replace(SLIDE, spring=100.0, rest=-0.05, offset=5.0, coulomb=coulomb))
     assert set(found.effects) == {"return_spring"} | ({"coulomb_friction"} if coulomb else set()), found.sentence
     force = STANDARD["return_spring"].functions["force"]
     own = values(found)["return_spring"]
-    here, beyond = force(*own, 0.0, 1.0), force(*own, 1e-3, 1.0)  # far from its rest, nobody can tell where it softens
+    here, beyond = force(*own, 0.0, 1.0), force(*own, 1e-3, 1.0)  # far from its rest, softening cannot be determined
     assert (here, (beyond - here) / 1e-3) == pytest.approx((5.0, 100.0), rel=0.02)
 
 
 def test_a_spring_that_does_not_stiffen_is_not_said_to() -> None:
-    """A flexure at its rest: hardening stiffness with nothing that hardens has fewer parameters, and is the wrong name."""
+    """A flexure at its rest: hardening stiffness without hardening has fewer parameters, and is the wrong name."""
     found = of(replace(SLIDE, spring=100.0, coulomb=0.2))
     assert set(found.effects) == {"return_spring", "coulomb_friction"}, found.sentence
     assert found.confidence > 0.9
@@ -162,7 +162,7 @@ def test_a_spring_that_does_not_stiffen_is_not_said_to() -> None:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_part_of_a_wave_is_no_spring_that_gives_way(seed: int) -> None:
-    """Noise moves the axis over seven to nine tenths of a period, around one place of rest."""
+    """Noise moves the axis over 0.7 to 0.9 of a period, around one rest position."""
     drive, position = driven(replace(SLIDE, cogging=0.2, period=0.02, drag=20.0, shake=1.5, band=(0.2, 60.0)), seed)
     assert 0.65 < np.ptp(position) / 0.02 < 0.95
     found = diagnose(1000.0, drive, position)
@@ -182,7 +182,7 @@ def test_a_part_of_a_wave_is_no_spring_that_gives_way(seed: int) -> None:
     ],
 )
 def test_values_outside_of_where_a_law_holds_are_refused_in_words(effect: str, inside: tuple[float, ...], outside: tuple[float, ...]) -> None:
-    """On a travel of 20 mm: what is said names the limit, and is empty within it."""
+    """On a travel of 20 mm: the reason names the limit, and is empty within it."""
     refusal = STANDARD[effect].refusal
     assert refusal is not None and EFFECTS[effect].refusal is refusal
     assert refusal(inside, (-0.01, 0.01)) == ""
@@ -192,7 +192,7 @@ def test_values_outside_of_where_a_law_holds_are_refused_in_words(effect: str, i
 @pytest.mark.parametrize("cut", [3333, 4444, 6000])
 @pytest.mark.parametrize(("coulomb", "effects"), [(0.0, ()), (0.3, ("coulomb_friction",))])
 def test_a_recording_that_begins_in_motion_is_a_recording(cut: int, coulomb: float, effects: tuple[str, ...]) -> None:
-    """Cut out of a longer one, of a machine that coasts for a second: how fast it began is no effect that is missing."""
+    """Cut from a longer recording of a machine that coasts for a second: its start speed is not a missing effect."""
     coasting = Joint(fs=1000.0, seconds=25.0, count=1e-6, mass=1.0, drag=1.0, coulomb=coulomb, shake=3.0, band=(0.2, 60.0))
     drive, position = driven(coasting, 2)
     found = diagnose(coasting.fs, drive[cut:], position[cut:])

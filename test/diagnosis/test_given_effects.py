@@ -1,4 +1,4 @@
-"""A search from effects that somebody gave: they stay, and nothing asks how the axis would do without them."""
+"""A search from given effects: they are kept, and no model without them is tested."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def data() -> AxisData:
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_search_goes_on_from_a_mode_that_was_given(mode: str, data: AxisData) -> None:
-    """The mode keeps its name and its place; the friction is found beside it."""
+    """The mode keeps its name and its place; the friction is found in addition."""
     found = refine(data, given=[mode], effort=Effort(most=1))
     assert found.effects == (mode, "coulomb_friction")
     assert [rung.added for rung in found.rungs] == [None, *found.effects]
@@ -31,12 +31,12 @@ def test_a_search_goes_on_from_a_mode_that_was_given(mode: str, data: AxisData) 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_mode_that_was_given_stays_where_nothing_else_was_fitted(mode: str, data: AxisData) -> None:
-    """No budget at all: there is no set without the mode, and none is asked for."""
+    """Without a budget there is no set without the mode, and none is needed."""
     found = refine(data, given=[mode], effort=Effort(budget=-1.0, clock=lambda: 0.0))
     assert found.effects == (mode,) and found.stopped
 
 
 def test_an_effect_that_is_given_twice_is_refused(data: AxisData) -> None:
-    """Two steps of the ladder with one name would be one model, fitted twice."""
+    """Two steps of the ladder with one name would be the same model, fitted twice."""
     with pytest.raises(BadInput, match=r"coulomb_friction 2 times.*each effect once"):
         refine_run(Run("x", data.sampling_rate, data.voltage, data.position), ["coulomb_friction", "coulomb_friction"], auto=False)

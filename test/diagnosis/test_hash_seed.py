@@ -1,4 +1,4 @@
-"""The same recording, the same answer: whatever order a process gives to its sets."""
+"""The same recording gives the same answer, for any order of the sets in a process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from helpers.simulated import recorded
 
 
 def test_the_seed_of_the_hashes_changes_no_answer(tmp_path: Path) -> None:
-    """Two processes with other seeds say the same to the last byte, but for the time that they took."""
+    """Two processes with different hash seeds give the same bytes, except for the elapsed time."""
     voltage, position = recorded("coulomb_friction+cogging", seconds=10.0).axis("x")
     path = tmp_path / "rec.npz"
     np.savez(path, voltage=voltage, position=position, fs=2000.0)

@@ -1,4 +1,4 @@
-"""No rung raises the held-out error: neither of a search, nor of the verdict on it, on simulated axes and on real ones."""
+"""No rung raises the held-out error, neither in a search nor in its verdict, on simulated and on real axes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sysid.diagnosis.answer import Answer
 
 
 def falls(found: Answer) -> bool:
-    """From rung to rung, of what is judged alike: an error one sample ahead is another one."""
+    """The error falls from rung to rung with the same kind of error; that of one-step prediction is another kind."""
     return all(after.held_out_error < before.held_out_error for before, after in pairwise(found.rungs) if before.one_step == after.one_step)
 
 

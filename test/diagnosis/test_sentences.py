@@ -1,4 +1,4 @@
-"""What a diagnosis says does not contradict itself: figures of one error, and why what leaves little explains nothing."""
+"""The sentences of a diagnosis are consistent: numbers of one error, and the reason why a candidate with a small error is refused."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def ladder(data: AxisData) -> Answer:
 
 
 def noisier(data: AxisData, ladder: Answer) -> tuple[AxisData, Answer]:
-    """The same axis, where the encoder is taken for noisier at high frequency than it is, as after few coarse counts."""
+    """The same axis with overestimated encoder noise at high frequency, as with few coarse counts."""
     noise = data.floor.noise.copy()
     noise[-3:] *= 1e6
     louder = replace(data, floor=replace(data.floor, noise=noise))
@@ -47,7 +47,7 @@ def noisier(data: AxisData, ladder: Answer) -> tuple[AxisData, Answer]:
 
 
 def test_what_is_not_in_the_library_is_never_nothing_of_the_motion(data: AxisData, ladder: Answer) -> None:
-    """Noise of one band does not hide what another has: the error beyond it is part of the error that is told, and not 0 %."""
+    """Noise in one band does not hide the error in another: the error above it is part of the stated error, and not 0 %."""
     louder, same = noisier(data, ladder)
     assert same.noise > same.base.held_out_error and same.discrepancy == 0.0
     for found in (judged(data, ladder, STANDARD), judged(louder, same, STANDARD)):
@@ -62,14 +62,14 @@ def test_what_is_not_in_the_library_is_never_nothing_of_the_motion(data: AxisDat
 
 
 def with_a_refused_candidate(data: AxisData, ladder: Answer) -> Answer:
-    """One effect leaves next to nothing, and is refused."""
+    """One effect with a very small error, which is refused."""
     rung = Rung.of(replace(ladder.base, held_out_error=0.01 * ladder.base.held_out_error), ("cogging",))
     tried = Tried(rung, explained=0.991, refused="cogging: amplitude is at its bound")
     return judged(data, replace(ladder, candidates=(tried,)), STANDARD)
 
 
 def test_an_effect_that_leaves_little_and_is_refused_says_so_where_it_stands(data: AxisData, ladder: Answer) -> None:
-    """In the evidence of the page, of the report and of the JSON document; one that is not refused has no such word."""
+    """The reason is in the evidence of the page, of the report and of the JSON document; an accepted effect has none."""
     found = with_a_refused_candidate(data, ladder)
     assert found.sentence.startswith("Not in the library: no effect explains")
     (told,) = found.candidates
@@ -90,7 +90,7 @@ def test_refine_does_not_say_that_nothing_helps_beside_a_falling_error(ladder: A
 
 
 def test_nothing_missing_is_told_with_the_floor_of_the_ladder(data: AxisData) -> None:
-    """The number beside the error is the one that page, report and refine call the noise floor."""
+    """The number after the error is the noise floor of page, report and refine."""
     clean = prepare(2000.0, *recorded("", seconds=8.0).axis("x"))
     found = judged(clean, refine(clean, effort=Effort(most=0)), STANDARD)
     assert found.verdict == "nothing_missing"
@@ -100,7 +100,7 @@ def test_nothing_missing_is_told_with_the_floor_of_the_ladder(data: AxisData) ->
 
 
 def test_parameters_of_what_is_not_named_are_not_shown_as_found(data: AxisData, ladder: Answer, capsys: pytest.CaptureFixture[str]) -> None:
-    """Friction that explains a part of what is not in the library stands in the sentence, and nowhere as a part of the model."""
+    """Friction that explains a part of an unknown effect is in the sentence, but not in the model."""
     more = fit_with(data, ladder.base, ["coulomb_friction"])
     found = replace(ladder, rungs=(*ladder.rungs, Rung.of(more, ("coulomb_friction",))), best=("coulomb_friction",), explained=0.3)
     found = judged(data, found, STANDARD)

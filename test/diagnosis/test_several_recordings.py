@@ -1,4 +1,4 @@
-"""Several recordings of one machine: what it carries may differ from day to day, all else is one and the same."""
+"""Several recordings of one machine: its payload may differ between days, everything else is the same."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ SLIDE = Joint(fs=1000.0, seconds=25.0, count=1e-6, mass=0.1, drag=10.0, coulomb=
 
 
 def recorded(*loads: float) -> list[Run]:
-    """A recording for each load, with noise of its own."""
+    """A recording for each load, each with its own noise."""
     every = enumerate(loads, 1)
     return [xy.Recording.from_arrays(SLIDE.fs, *driven(replace(SLIDE, load=load), seed)).run("x") for seed, load in every]
 
 
 @pytest.mark.parametrize("loads", [(0.3, -0.1, 0.6), (0.0, 0.3), (0.25, -0.25)])
 def test_each_recording_has_its_own_load(loads: tuple[float, ...]) -> None:
-    """Also where the first carries nothing, and where the mean is none; friction and mass are those of all."""
+    """Also if the first load is zero, and if their mean is zero; friction and mass are common to all."""
     found = xy.diagnose(recorded(*loads))
     assert set(found.effects) == {"constant_load", "coulomb_friction"}, found.sentence
     assert found.confidence > 0.9
@@ -42,13 +42,13 @@ def test_each_recording_has_its_own_load(loads: tuple[float, ...]) -> None:
 
 
 def test_where_the_load_is_one_and_the_same_friction_is_one_law() -> None:
-    """Friction with a load is asymmetric friction, of several recordings as of one."""
+    """Friction with a load equals asymmetric friction, for several recordings as for one."""
     found = xy.diagnose(recorded(0.2, 0.2))
     assert found.effects == ("asymmetric_friction",), found.sentence
 
 
 def test_a_model_says_what_each_recording_carried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """In its file and in the table of parameters; the mean is what it predicts other recordings with."""
+    """The values are in its file and in the table of parameters; other recordings are predicted with the mean."""
     found = xy.refine(recorded(0.3, 0.1), add=("coulomb_friction", "constant_load"), auto=False)
     xy.save(found.model, tmp_path / "model.yaml")
     written = yaml.safe_load((tmp_path / "model.yaml").read_text())["axes"]["x"]["parameters"]["constant_load.load"]
@@ -62,7 +62,7 @@ def test_a_model_says_what_each_recording_carried(tmp_path: Path, capsys: pytest
 
 
 def test_a_load_of_each_recording_goes_where_its_effect_goes() -> None:
-    """Taken out or changed it is forgotten, kept beside others it stays; in a recording it is the effect's own value."""
+    """If the effect is removed or changed, its values are dropped; with added effects they are kept; in a recording each is the effect's value."""
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("constant_load", (0.2,))
     model = replace(model, per_recording=(("constant_load.load", (0.1, 0.3)),))
     assert [dict(model.in_recording(k).effects)["constant_load"] for k in (0, 1)] == [(0.1,), (0.3,)]
@@ -72,7 +72,7 @@ def test_a_load_of_each_recording_goes_where_its_effect_goes() -> None:
 
 
 def test_the_first_stage_holds_the_beginning_of_every_recording() -> None:
-    """So that what one of them shows alone is seen from the start; windows lie within one of them."""
+    """An effect that only one of them shows is visible from the start; each window lies within one recording."""
     runs = recorded(0.0, 0.3, 0.1)
     data = prepare_all(SLIDE.fs, [run.signals[:2] for run in runs])
     assert all(0 < count < step.stop - step.start for count, step in zip(data.early, data.steps, strict=True))

@@ -1,4 +1,4 @@
-"""Many recordings, each too short to tell anything by itself, are used together."""
+"""Many recordings, each too short for a fit, are used together."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def parts() -> list[Recording]:
 
 
 def test_short_recordings_together_name_the_friction(parts: list[Recording]) -> None:
-    """Fewer samples each than a fit takes alone; together they tell it and its size."""
+    """Each has fewer samples than a fit needs; together they show the effect and its size."""
     found = xy.diagnose(parts)
     assert found.effects == ("coulomb_friction",), found.sentence
     assert found.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.5, rel=0.05)
@@ -30,7 +30,7 @@ def test_short_recordings_together_name_the_friction(parts: list[Recording]) -> 
 
 
 def test_a_recording_with_gaps_is_used_with_all_its_stretches(parts: list[Recording]) -> None:
-    """As recordings one by one: nothing is left out because another stretch is longer."""
+    """The same as separate recordings: no stretch is left out because another is longer."""
     whole = replace(
         parts[0],
         seq=np.concatenate([part.seq + 200 * k for k, part in enumerate(parts)]),
@@ -43,7 +43,7 @@ def test_a_recording_with_gaps_is_used_with_all_its_stretches(parts: list[Record
 
 
 def test_an_axis_at_constant_speed_is_not_said_to_stand() -> None:
-    """It moves throughout; what lacks is a change of speed, and a command for such tests is named."""
+    """It moves all the time; a change of speed is missing, and the error names a command for such tests."""
     n = 3000
     u = np.where(np.arange(n) < 1500, 1.0, 2.0)
     position = np.cumsum(u) * 0.01 + 1e-4 * np.random.default_rng(1).normal(size=n)
@@ -52,7 +52,7 @@ def test_an_axis_at_constant_speed_is_not_said_to_stand() -> None:
 
 
 def test_refine_refuses_what_diagnose_calls_not_enough_data(parts: list[Recording]) -> None:
-    """An output that stands, one that does not follow the input, and too few windows: one line with the same reason, as no fit tells anything."""
+    """A constant output, one that does not follow the input, and too few windows: one line with the reason, since no fit is meaningful."""
     rng = np.random.default_rng(3)
     drive = rng.normal(size=3000)
     for position in (np.full(3000, 0.2), np.cumsum(rng.normal(size=3000)) * 1e-3):

@@ -1,4 +1,4 @@
-"""The force that nobody modelled is said in the unit of the input, with its size and where in frequency it acts."""
+"""The unmodelled force is stated in the unit of the input, with its size and its frequency range."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_force_that_no_effect_explains_is_told_with_its_size_and_its_frequenci
 
 
 def test_where_friction_is_named_the_force_is_what_it_leaves() -> None:
-    """A small part of what the friction was."""
+    """A small fraction of the friction."""
     found = diagnose(RATE, *recorded("coulomb_friction", seconds=20.0).axis("x"))
     assert found.effects == ("coulomb_friction",)
     assert found.force is not None and found.force.rms < 0.1 * found.final.parameter("coulomb_friction.coulomb").value

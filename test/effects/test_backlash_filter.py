@@ -1,4 +1,4 @@
-"""The filter across a gap: its derivatives, any law of dry friction inside it, and what it must beat."""
+"""The filter across a gap: its derivatives, any law of dry friction in it, and the bar for its innovations."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def innovations(data: AxisData, base: GreyboxFit, *laws: str, others: tuple[tupl
 
 
 def test_a_contact_that_is_stiff_and_damped_does_not_run_away_in_coarse_steps() -> None:
-    """Explicit steps are as many as it needs: with three a sample it would leave the recording, and stay there."""
+    """It has enough explicit steps: with three per sample it would diverge from the recording."""
     data, base = machine("backlash=20e-6")
     fit = innovations(data, base, "coulomb_friction")
     inner = fit.start((base.model.gain, base.model.delay, base.model.pole), (20e-6, 0.75, 3900.0, 1.0, 100.0, 0.4, 0.0, 0.0), (0.1,))
@@ -90,7 +90,7 @@ def test_a_contact_that_is_stiff_and_damped_does_not_run_away_in_coarse_steps() 
 
 
 def test_starts_that_are_tried_on_all_cores_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bit for bit, and with as many runs, as one after the other; an amplifier's dead zone is taken out for each by numbers of its own."""
+    """Parallel and sequential runs are equal bit for bit, with the same number of runs; each removes the dead zone with its own parameters."""
     data, base = machine("backlash=20e-6", "dead_zone=0.05")
     found = []
     for cores in (1, 3):
@@ -111,7 +111,7 @@ def test_starts_that_are_tried_on_all_cores_find_the_same(monkeypatch: pytest.Mo
     ],
 )
 def test_derivatives_are_those_of_the_filter(name: str, values: tuple[float, ...]) -> None:
-    """Each column points where a small change of its number takes the innovations (the median sample to a fifth; the gain is held)."""
+    """Each column agrees with the effect of a small change of its number (the median sample to a fifth; at constant gain)."""
     truth = [f"{name}={values[0]}", "dead_zone=0.05"]
     data, base = machine("backlash=20e-6", *truth[:1] if name == "coulomb_friction" else (), truth[1])
     fit = innovations(data, base, name, others=(("dead_zone", (0.05,)),))
@@ -129,11 +129,11 @@ def test_derivatives_are_those_of_the_filter(name: str, values: tuple[float, ...
         if fit.low[place] + 1e-2 < inner[place] < fit.high[place] - 1e-2:
             difference = (moved[0] - moved[1]) / 2e-3
             seen = float(np.median(np.abs(difference)))
-            assert np.median(np.abs(slopes[:, place] - difference)) < max(0.25 * seen, 1e-3), place  # less than 1e-3 of the noise shows nothing
+            assert np.median(np.abs(slopes[:, place] - difference)) < max(0.25 * seen, 1e-3), place  # a change below 1e-3 of the noise is not visible
 
 
 def test_a_law_of_friction_from_a_user_s_file_acts_inside_the_filter(tmp_path: Path) -> None:
-    """Nobody names it: the filter moves as the simulation does, and a fit beside a gap recovers its level."""
+    """A user's law: the filter moves like the simulation, and a fit with a gap recovers its level."""
     path = tmp_path / "growing_friction.py"
     path.write_text(OWN_LAW, encoding="utf-8")
     (law,) = from_file(path)
@@ -148,7 +148,7 @@ def test_a_law_of_friction_from_a_user_s_file_acts_inside_the_filter(tmp_path: P
 
 
 def filter_leaves(law: Effect, values: tuple[float, ...]) -> float:
-    """Part of the simulated speed that the filter misses without a gap, told next to nothing by the encoder."""
+    """Relative error of the filter's speed without a gap, with a negligible weight of the encoder."""
     u = 3.0 * lfilter([0.3], [1.0, -0.7], np.random.default_rng(1).standard_normal(4001))
     velocity = simulate(AxisModel(*BASE, library=Library([law])).with_effect(law.name, values), RATE, u, np.zeros_like(u))
     position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
@@ -162,7 +162,7 @@ def filter_leaves(law: Effect, values: tuple[float, ...]) -> float:
 
 
 def test_two_laws_of_bristles_at_once_are_refused() -> None:
-    """In one line, that says what to leave out."""
+    """One line that says what to leave out."""
     data, base = machine("backlash=30e-6")
     twice = replace(EFFECTS["presliding_hysteresis"], name="other_bristles")
     known = Library([GAP, EFFECTS["presliding_hysteresis"], twice])
@@ -172,7 +172,7 @@ def test_two_laws_of_bristles_at_once_are_refused() -> None:
 
 
 def test_the_filter_without_a_gap_is_always_there_to_be_beaten() -> None:
-    """Where there is a gap it is far behind; where there is none it is as good, to a few hundredths."""
+    """With a true gap it is far worse; without one it is as good, to a few hundredths."""
     data, base = machine("backlash=30e-6")
     fit, found = filter_fit(data, base, GAP)
     assert found.without.shape == found.innovation.shape
@@ -184,7 +184,7 @@ def test_the_filter_without_a_gap_is_always_there_to_be_beaten() -> None:
 
 
 def test_a_gap_that_cannot_come_near_the_best_without_it_is_given_up_soon() -> None:
-    """Against a simulation that predicts down to the noise: fewer runs, and it says so; a true gap is not given up."""
+    """Compared with a simulation at the noise: fewer runs, and the result says so; the fit of a true gap is not given up."""
     data, base = machine("coulomb_friction=0.2")
     held = np.arange(data.velocity.size) >= data.training
     whole, its = filter_fit(data, base, GAP)
@@ -204,7 +204,7 @@ def test_a_gap_that_cannot_come_near_the_best_without_it_is_given_up_soon() -> N
 def test_what_beats_the_bar_where_nobody_fitted_goes_on_even_if_the_filter_does_as_well_without_a_gap(
     idle: float, times: float, given_up: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The bar is the error of the held-out part, and is held against that. idle: 0 is every gap; times: bar over what the gap leaves in the end."""
+    """The bar applies to the held-out error. idle: 0 counts every gap as without effect; times: bar over the final innovation with the gap."""
     data, base = machine("backlash=30e-6")
     bar = times * filter_fit(data, base, GAP)[0].held_out_error
     monkeypatch.setattr(contact, "IDLE", idle)
@@ -212,7 +212,7 @@ def test_what_beats_the_bar_where_nobody_fitted_goes_on_even_if_the_filter_does_
 
 
 def test_what_was_given_up_says_nothing_of_its_numbers() -> None:
-    """Their intervals are as wide as can be."""
+    """Their intervals are infinite."""
     data, base = machine("backlash=30e-6")
     fit, found = filter_fit(data, base, GAP, limits=Limits(bar=1e-9))
     assert found.given_up

@@ -1,4 +1,4 @@
-"""A gap is found whatever its contact is: linear or stiffening, lightly or well damped, rubbing on either side."""
+"""A gap is found with any contact: linear or stiffening, lightly or well damped, with friction on either side."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ GAP = EFFECTS["backlash"]
     ids=["lightly damped", "Hertz", "a few counts before a table that rubs", "Hertz behind a motor that rubs"],
 )
 def test_the_gap_and_the_masses_come_out_right(machine: GapMachine) -> None:
-    """To 10 % and 0.03, and the same filter without a gap leaves at least twice as much."""
+    """To 10 % and 0.03, and the same filter without a gap has at least twice the innovations."""
     data = prepare(machine.fs, *driven(machine, 1))
     fit, found = filter_fit(data, fit_base(data), GAP)
     assert fit.parameter("backlash.gap").value == pytest.approx(machine.gap * machine.count, rel=0.1)
@@ -36,7 +36,7 @@ def test_the_gap_and_the_masses_come_out_right(machine: GapMachine) -> None:
 
 
 def test_the_contact_comes_out_right_too() -> None:
-    """Of a linear one its frequency and damping, and that it does not stiffen."""
+    """For a linear contact, frequency and damping, and no stiffening."""
     machine = GapMachine(gap=30.0, contact=650.0, damping=0.05)
     data = prepare(machine.fs, *driven(machine, 2))
     fit = filter_fit(data, fit_base(data), GAP)[0]
@@ -46,7 +46,7 @@ def test_the_contact_comes_out_right_too() -> None:
 
 
 def test_the_answer_is_the_same_in_other_units() -> None:
-    """Nothing in the search for a start knows metres or volts."""
+    """The search for a start does not depend on metres or volts."""
     machine = GapMachine(gap=30.0, contact=650.0, damping=0.05)
     u, y = driven(machine, 1)
     gaps = [_gap(prepare(machine.fs, u * volts, y * length)) / length for volts, length in ((1.0, 1.0), (300.0, 2000.0))]
@@ -59,7 +59,7 @@ def _gap(data: AxisData) -> float:
 
 @pytest.mark.parametrize(("name", "gap"), [("gap_hertz_16um", 16e-6), ("gap_linear_12um", 12e-6), ("gap_linear_37um", 37e-6)])
 def test_the_gaps_of_another_simulator_are_named(name: str, gap: float) -> None:
-    """And nothing else is; the gap to 5 %."""
+    """Only backlash is named; the gap to 5 %."""
     with np.load(real_data.data(f"gap_foreign/{name}.npz")) as arrays:
         found = diagnose(float(arrays["fs"]), arrays["u"], arrays["y"])
     assert found.effects == ("backlash",)

@@ -1,4 +1,4 @@
-"""Every effect of the folder is complete, honest about its limits, and absent when its size is zero."""
+"""Every effect of the folder is complete, states its validity, and has no influence at size zero."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from xy_sysid.samples.block import FloatArray
 
 RATE = 2000.0
 PACKAGE = Path(__file__).parents[2] / "xy_sysid"
-RELATIONS = ("look_alikes", "suspects", "special_of", "sum_of", "start_friction", "masks")  # fields in which an effect may name others
+RELATIONS = ("look_alikes", "suspects", "special_of", "sum_of", "start_friction", "masks")  # fields of an effect that may name other effects
 
 
 def names(text: str) -> list[str]:
@@ -37,7 +37,7 @@ ACTING = [name for name in EFFECTS if EFFECTS[name].category != "base"]
 
 @cache
 def motion(n: int = 8001) -> tuple[FloatArray, FloatArray]:
-    """Band noise of 1 V rms, and a position that goes along with it, (n,) each."""
+    """Band noise of 1 V rms, and a related position, (n,) each."""
     u = sosfilt(butter(4, 300, fs=RATE, output="sos"), np.random.default_rng(0).standard_normal(n))
     u = np.asarray(u / u.std())
     x = np.concatenate(([0.0], np.cumsum(simulate(BASE, RATE, u, np.zeros(n))) / RATE))
@@ -51,7 +51,7 @@ def test_the_folder_holds_the_promised_effects() -> None:
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_an_effect_says_everything_about_itself(name: str) -> None:
-    """Law, meaning, validity, source, how it shows itself, look-alikes that exist, an experiment, parameters in order."""
+    """Law, meaning, validity, source, signs in data, existing look-alikes, an experiment, parameters in order."""
     effect = EFFECTS[name]
     assert effect.name == name
     for text in (effect.law, effect.meaning, effect.validity, effect.source, effect.shows, effect.experiment):
@@ -60,7 +60,7 @@ def test_an_effect_says_everything_about_itself(name: str) -> None:
     assert effect.look_alikes
     assert set(effect.look_alikes) <= set(EFFECTS) - {name}
     assert {*effect.suspects, *effect.masks} <= set(EFFECTS) - {name}
-    assert effect.suspects or effect.simulable or effect.category == "base"  # else nothing would ever ask for it
+    assert effect.suspects or effect.simulable or effect.category == "base"  # otherwise it would never be used
     assert bool(effect.mode_frequency) == (effect.category == "motion")
     assert not effect.mode_frequency or dict(zip(effect.names, effect.parameters, strict=True))[effect.mode_frequency].unit == "Hz"
     assert sorted(effect.functions) == sorted(FUNCTIONS[effect.category])
@@ -75,13 +75,13 @@ def test_an_effect_says_everything_about_itself(name: str) -> None:
 
 
 def test_no_effect_is_named_in_code_outside_its_own_file() -> None:
-    """One effect, one file or folder: elsewhere only relation fields of other effects, and texts, know its name."""
+    """One effect, one file or folder: elsewhere its name is only in relation fields of other effects, and in texts."""
     found = {str(path.relative_to(PACKAGE)): names for path in sorted(PACKAGE.rglob("*.py")) if (names := effects_named_in(path))}
     assert not found, f"{found}: use what an effect says of itself (category, family, a field)"
 
 
 def effects_named_in(path: Path) -> list[str]:
-    """Where a file of the package names effects that are not its own."""
+    """Places in the package's files that name effects of other files."""
     place = path.relative_to(PACKAGE)
     own = place.parts[1].removesuffix(".py") if place.parts[0] == "effects" else ""
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -101,14 +101,14 @@ def effects_named_in(path: Path) -> list[str]:
 
 
 def test_the_folder_tells_effects_from_tools_by_their_names() -> None:
-    """What begins with an underscore is a tool; everything else is one effect, whose name is that of its file or folder."""
+    """Names with a leading underscore are tools; everything else is one effect, named like its file or folder."""
     there = {path.stem for path in (PACKAGE / "effects").iterdir() if path.suffix == ".py" or (path / "__init__.py").is_file()}
     assert {name for name in there if not name.startswith("_")} == set(EFFECTS)
 
 
 @pytest.mark.parametrize("name", ACTING)
 def test_an_effect_of_size_zero_is_the_base_bit_for_bit(name: str) -> None:
-    """Nothing of an absent effect is left in the loop."""
+    """An absent effect has no influence in the loop."""
     u, x = motion()
     values = (0.0, *EFFECTS[name].typical[1:])
     assert np.array_equal(simulate(BASE.with_effect(name, values), RATE, u, x), simulate(BASE, RATE, u, x))
@@ -116,7 +116,7 @@ def test_an_effect_of_size_zero_is_the_base_bit_for_bit(name: str) -> None:
 
 @pytest.mark.parametrize("name", ACTING)
 def test_an_effect_fades_with_its_size(name: str) -> None:
-    """A thousandth of the usual size moves the axis far less than the usual size does; or a thousandfold one, of a limit or a frequency."""
+    """A thousandth of the typical size changes the motion far less than the typical size (for a limit or a frequency, a thousand times the size)."""
     effect = EFFECTS[name]
     if not effect.simulable:
         pytest.skip("free simulation does not judge it: without a gap there are still two masses")
@@ -137,7 +137,7 @@ def test_an_effect_fades_with_its_size(name: str) -> None:
 
 @pytest.mark.parametrize("name", ACTING)
 def test_an_effect_reads_its_start_values_from_data(name: str) -> None:
-    """Each of its traces is finite, of the data's length, and read into one value per parameter; there are some once the axis travels."""
+    """Each of its traces is finite, has the data's length, and gives one value per parameter; a moving axis has some."""
     u, x = motion()
     effect = EFFECTS[name]
     truth = simulate(BASE.with_effect(name), RATE, u, x)
@@ -155,7 +155,7 @@ def test_an_effect_reads_its_start_values_from_data(name: str) -> None:
 
 @pytest.mark.parametrize(("samples", "asked"), [(1000, 1), (2**16 + 1, 2)])
 def test_what_an_effect_guesses_of_a_short_scene_is_worked_out_once(samples: int, asked: int) -> None:
-    """Of a long one it would be a load to keep."""
+    """For a long scene they would need too much memory."""
     calls: list[Scene] = []
 
     def guesses(scene: Scene) -> list[Guess]:
@@ -169,7 +169,7 @@ def test_what_an_effect_guesses_of_a_short_scene_is_worked_out_once(samples: int
 
 
 def test_a_weight_is_not_looked_for_where_it_is_a_load_and_a_spring() -> None:
-    """Less than half a radian of travel, or a linear axis: no trace, so that the simpler laws get the name."""
+    """Less than half a radian of travel, or a linear axis: no trace, so that simpler laws are named."""
     u, x = motion()
     still = np.zeros(u.size - 1)
     for reach, traces in ((0.4, 0), (0.6, 1)):
@@ -179,13 +179,13 @@ def test_a_weight_is_not_looked_for_where_it_is_a_load_and_a_spring() -> None:
 
 
 def test_a_frequency_that_is_no_parameter_is_refused() -> None:
-    """The error names what there is."""
+    """The error lists the existing ones."""
     with pytest.raises(BadInput, match="mode_frequency is 'resonance'; allowed: split, frequency, damping, pole_damping"):
         replace(EFFECTS["base_resonance"], mode_frequency="resonance")
 
 
 def test_what_is_fitted_as_a_logarithm_is_one_and_the_same_in_every_recording() -> None:
-    """Recordings differ by a sum, which a logarithm does not know."""
+    """Values per recording differ by a sum, which a logarithm cannot represent."""
     effect = EFFECTS["coulomb_friction"]
     with pytest.raises(BadInput, match="per_recording is of a positive parameter"):
         replace(effect, parameters=tuple(replace(item, per_recording=True) for item in effect.parameters))
@@ -210,7 +210,7 @@ def test_a_force_that_is_no_straight_line_of_speed_is_not_taken_for_one() -> Non
 
 
 def test_a_law_with_an_unknown_word_is_refused() -> None:
-    """The error names the argument and what is known."""
+    """The error names the argument and the known ones."""
     effect = EFFECTS["constant_load"]
 
     def force(load: float, temperature: float) -> float:

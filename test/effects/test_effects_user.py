@@ -1,4 +1,4 @@
-"""An effect of a user's own, and the pages that tell of effects."""
+"""A user's own effect, and the pages about effects."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ RATE = 2000.0
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The guide's own file."""
+    """The file of the guide."""
     path = tmp_path_factory.mktemp("own") / "mains_hum.py"
     path.write_text(re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)[0], encoding="utf-8")
     return path
@@ -77,7 +77,7 @@ def test_the_guides_example_is_simulated_screened_and_fitted(example: Path) -> N
 
 
 def test_a_file_that_changes_changes_no_effect_that_was_loaded_before(example: Path, tmp_path: Path) -> None:
-    """A loop's name on the disk tells by the text that was loaded whose law is compiled in it: never that of the file as it is now."""
+    """The name of a cached loop depends on the loaded text of the effect file, not on the file's present content."""
     text, files = example.read_text(encoding="utf-8"), [tmp_path / "own.py", tmp_path / "other" / "own.py"]
     files[1].parent.mkdir()
     effects = []
@@ -101,7 +101,7 @@ def test_a_file_without_an_effect_is_refused_in_one_line(tmp_path: Path) -> None
 
 
 def test_the_command_lists_every_effect_and_shows_one_in_full(app: typer.Typer, example: Path) -> None:
-    """As a table, in full, and as JSON with units; a file's effect too."""
+    """As a table, in full, and as JSON with units; also for the effect of a file."""
     run = CliRunner()
     listed = run.invoke(app, [])
     assert listed.exit_code == 0

@@ -1,4 +1,4 @@
-"""A resonance's traces: of the few frequencies that the averaged spectra show, the best is the best of all."""
+"""Traces of a resonance: the best of the few frequencies from averaged spectra is the best of all frequencies."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def fitted(*effects: tuple[str, tuple[float, ...]]) -> tuple[AxisData, GreyboxFi
     model = BASE
     for name, values in effects:
         model = model.with_effect(name, values)
-    place = np.zeros(voltage.size)  # nothing here asks where the axis is
+    place = np.zeros(voltage.size)  # no law here depends on position
     velocity = simulate(model, RATE, voltage, place)
     position = np.round(np.concatenate(((0.0,), np.cumsum(velocity) / RATE)) / 1e-7) * 1e-7
     data = prepare(RATE, voltage, position)
@@ -43,7 +43,7 @@ def everywhere(scene: Scene, frequencies: FloatArray) -> FloatArray:
 def test_the_trace_of_a_resonance_is_as_good_as_the_best_of_all_frequencies(
     effect: str, frequency: float, beside: tuple[tuple[str, tuple[float, ...]], ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Found among four, with friction that the base takes for drag in the error, too."""
+    """Found among four, also with friction that the base has fitted as drag."""
     data, base = fitted((effect, (0.1, frequency, 0.03, 0.03)), *beside)
     few = screened(data, base, [STANDARD[effect]], scene_of(data, base)).traces[0]
     monkeypatch.setattr(_pole_zero_pair, "_likely", everywhere)
@@ -54,7 +54,7 @@ def test_the_trace_of_a_resonance_is_as_good_as_the_best_of_all_frequencies(
 
 
 def test_a_scene_that_stands_still_shows_no_frequency() -> None:
-    """And asks for none: zeros divide nothing."""
+    """A spectrum of zeros gives no frequency and no division by zero."""
     still = np.zeros(4000)
     scene = Scene(RATE, BASE.gain, BASE.pole, still, still, still, still)
     with np.errstate(all="raise"):

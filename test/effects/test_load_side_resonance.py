@@ -18,7 +18,7 @@ NAME = "load_side_resonance"
 
 @pytest.mark.parametrize("hertz", [30, 110])
 def test_a_screw_that_gives_is_named_as_the_encoder_sees_it(hertz: int) -> None:
-    """The same machine with the encoder on the table, and on the motor: the antiresonance tells which."""
+    """The same machine with the encoder on the table, and on the motor: the antiresonance distinguishes them."""
     screw = f"screw_compliance,frequency={hertz}"
     seen_from_table = xy.diagnose(recorded(screw, encoder_on="table").run("x"))
     assert seen_from_table.effects == (NAME,)
@@ -27,7 +27,7 @@ def test_a_screw_that_gives_is_named_as_the_encoder_sees_it(hertz: int) -> None:
 
 
 def test_its_linear_part_has_two_poles_and_no_zeros() -> None:
-    """Of 60 Hz and 0.05, behind the base."""
+    """A resonance of 60 Hz with damping 0.05, behind the base."""
     found = linear_part(AxisModel(0.1, 1e-3, 200.0).with_effect(NAME, (60.0, 0.05)))
     assert found.numerator.size == 1
     pair = next(root for root in np.roots(found.denominator) if root.imag > 0.0)
@@ -36,13 +36,13 @@ def test_its_linear_part_has_two_poles_and_no_zeros() -> None:
 
 
 def test_what_goes_in_does_not_follow_from_what_comes_out() -> None:
-    """The load hides fast motion of the motor: the section is not taken out of a recording, as a pole-zero pair is."""
+    """The load filters fast motion of the motor: unlike a pole-zero pair, the section cannot be removed from a recording."""
     assert not undoable(EFFECTS[NAME])
     assert undoable(EFFECTS["base_resonance"])
 
 
 def test_the_two_mass_bench_is_explained() -> None:
-    """Its makers know 58.9 Hz and no zero; a two-mass model leaves 8.9 rad/s of what it was fitted to."""
+    """Its authors give 58.9 Hz and no zero; a two-mass model has a training error of 8.9 rad/s."""
     file = data("tue_bench/load_side.mat")
     run = xy.load(file, columns={"input": "1", "output": "2"}, rate=4000.0, units={"output": "rad"}).run("x").until(40.0)
     found = xy.diagnose(run)

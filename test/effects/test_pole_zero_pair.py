@@ -1,4 +1,4 @@
-"""What both resonances read of the frequency response: base and pair together."""
+"""Start values of both resonances from the frequency response: base and pair together."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ RATE = 1000.0
 
 
 def scene(voltage: FloatArray, velocity: FloatArray) -> Scene:
-    """As a base sees it that explains nothing."""
+    """The scene of a base that explains nothing."""
     position = np.cumsum(velocity) / RATE
     return Scene(sampling_rate=RATE, gain=1.0, pole=20.0, voltage=voltage, velocity=velocity, position=position, error=velocity)
 
 
 def test_base_and_pair_are_read_together_from_the_response() -> None:
-    """Of a motion with both, from a base that knows neither: each within a fifth, to begin a fit with."""
+    """For a motion with both, from a base without them: each within 20 %, as start values."""
     voltage = np.random.default_rng(2).normal(size=20_001)
     model = AxisModel(0.5, 4e-3, 52.0).with_effect("base_resonance", (0.2, 25.0, 0.03, 0.03))
     velocity = simulate(model, RATE, voltage, np.zeros(voltage.size))

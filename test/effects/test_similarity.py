@@ -1,4 +1,4 @@
-"""Bounds, usual sizes and starts go with the motion: an axis is told the same in other units."""
+"""Bounds, typical sizes and start values scale with the motion: other units give the same diagnosis."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from xy_sysid.effects._similarity import SPEED, VOLTAGE, Similarity
     ],
 )
 def test_a_unit_is_carried_over_by_its_powers(unit: str, factor: float) -> None:
-    """Length, time and drive each by their own; what has no unit, and a frequency, stay."""
+    """Length, time and drive scale separately; numbers without unit, and frequencies, are unchanged."""
     assert Similarity(length=3.0, time=2.0, voltage=5.0).factor(unit) == pytest.approx(factor)
 
 
@@ -44,7 +44,7 @@ def test_a_motion_like_the_usual_one_changes_nothing_and_standing_still_neither(
 
 
 def test_every_parameter_of_the_library_has_a_unit_that_is_understood() -> None:
-    """Made of V, m, s, rad and Hz; bounds keep their order on a machine that is a thousand times larger."""
+    """All units are made of V, m, s, rad and Hz; bounds keep their order on a machine a thousand times as large."""
     large = Similarity(length=1e3, time=10.0, voltage=1e-2)
     for effect in EFFECTS.values():
         for item, other in zip(effect.parameters, effect.on(large), strict=True):
@@ -55,7 +55,7 @@ def test_every_parameter_of_the_library_has_a_unit_that_is_understood() -> None:
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "stribeck_friction", "presliding_hysteresis", "backlash"])
 def test_the_same_axis_in_other_units_misses_the_same_effect(effect: str) -> None:
-    """Driven by hundreds of newtons, read in degrees: the name, its confidence, and each number in its own unit."""
+    """With hundreds of newtons and degrees: the same name and confidence, and each number in its own unit."""
     recording = recorded(effect, seconds=20.0)
     voltage, position = recording.axis("x")
     length, drive = 300.0, 200.0

@@ -1,4 +1,4 @@
-"""Commands for controllers of ros2_control: efforts and velocities as voltage, positions about where a joint stands."""
+"""Commands for controllers of ros2_control: efforts and velocities as voltage, positions relative to the measured one."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def seen(drive: Drive, position: float, seq: float | None = None) -> bool:
 
 
 def running(what: ExcitationSettings, position: float = 0.5) -> Drive:
-    """A drive that knows where the joint stands."""
+    """A drive that has received the position of the joint."""
     drive = Drive(what)
     drive.start()
     assert seen(drive, position, -1.0)
@@ -53,7 +53,7 @@ def test_no_position_is_sent_before_one_is_measured() -> None:
 
 
 def test_positions_are_a_small_signal_about_where_the_joint_stood_and_begin_without_a_step() -> None:
-    """The reference begins at the measured position, stays within limit of it, and its signal has the rms asked for."""
+    """The reference begins at the measured position, stays within the limit around it, and has the requested rms."""
     drive = running(settings())
     sent = followed(drive, 5000)
     assert drive.state == "active", drive.reason
@@ -63,7 +63,7 @@ def test_positions_are_a_small_signal_about_where_the_joint_stood_and_begin_with
 
 
 def test_the_last_position_is_a_measured_one_and_stays_it() -> None:
-    """Stopped: the reference fades to where the joint was measured, and does not creep after it when it sags."""
+    """Stopped: the reference fades to the measured position, and does not follow a sagging joint."""
     drive = running(settings())
     followed(drive, 1000)
     assert seen(drive, 0.48, drive.seq)
@@ -76,7 +76,7 @@ def test_the_last_position_is_a_measured_one_and_stays_it() -> None:
 
 
 def test_a_slow_sweep_carries_the_small_signal_through_the_range_and_the_travel_holds() -> None:
-    """slow, slow_period: the pose moves; whatever is asked for, no reference leaves the travel."""
+    """slow, slow_period: the centre moves; no reference leaves the travel, for any settings."""
     drive = running(settings(rms=0.01, limit=0.6, slow=0.5, slow_period=4.0, travel_max=0.8), 0.5)
     sent = followed(drive, 4000)
     assert drive.state == "active", drive.reason
@@ -86,7 +86,7 @@ def test_a_slow_sweep_carries_the_small_signal_through_the_range_and_the_travel_
 
 @pytest.mark.parametrize(("after", "words"), [(lambda reference: 0.5, "stands still"), (lambda reference: 0.95, "away from where its reference was")])
 def test_a_joint_that_does_not_follow_stops_it(after: Any, words: str) -> None:
-    """The controller does not listen, the encoder is frozen, something pushes: the drive stops and says so, in rad."""
+    """The controller ignores references, the encoder is frozen, an external force acts: the drive stops with a reason, in rad."""
     drive = running(settings())
     for _ in range(1500):
         value = float(drive.next(1).values[0, 0])
@@ -95,7 +95,7 @@ def test_a_joint_that_does_not_follow_stops_it(after: Any, words: str) -> None:
 
 
 def test_a_joint_outside_its_travel_is_not_moved() -> None:
-    """Position interface: one sentence with place and travel, and nothing but the measured position."""
+    """Position interface: one sentence with position and travel, and only the measured position as reference."""
     drive = Drive(settings())
     drive.start()
     seen(drive, 2.5, -1.0)
@@ -117,7 +117,7 @@ def test_efforts_and_velocities_end_at_zero_and_turn_inward_at_the_travel(interf
 
 
 def test_no_joint_state_for_the_watchdog_stops_it() -> None:
-    """The watchdog of voltage holds for commands, too: what is left is the position last measured."""
+    """The watchdog of voltage also applies to commands: the last measured position remains."""
     drive = running(settings())
     followed(drive, 100)
     last = drive.safe[0]
@@ -129,7 +129,7 @@ def test_no_joint_state_for_the_watchdog_stops_it() -> None:
 
 
 def test_stamps_of_another_clock_are_named() -> None:
-    """Joint states that are stamped by another clock are not usable, and the reason says which way and by how much."""
+    """Joint states with stamps of another clock are not usable, and the reason gives the sign and size of the difference."""
     drive = running(settings())
     followed(drive, 1000)
     assert not seen(drive, 0.5, drive.seq + 5000) and "stamped 10 s ahead" in drive.unusable
@@ -144,7 +144,7 @@ def test_stamps_of_another_clock_are_named() -> None:
     ],
 )
 def test_settings_that_do_not_fit_commands_are_refused_in_their_unit(values: dict[str, Any], words: str) -> None:
-    """A default that is meant for volts is no default for radians: limit and rms must be given."""
+    """The defaults for volts do not apply to radians: limit and rms must be given."""
     given = {"output": "commands", "unit": "rad", "rate": RATE, **{f"x.{name}": value for name, value in JOINT.items()}, **values}
     with pytest.raises(BadInput, match=words):
         build(ExcitationSettings, given)

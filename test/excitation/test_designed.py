@@ -1,4 +1,4 @@
-"""An experiment from a file, on a machine that has limits of its own."""
+"""An experiment from a file, on a machine with its own limits."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def document(**changes: Any) -> dict[str, Any]:
 
 
 def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> None:
-    """Kind, amplitude and time are the experiment's; limit, travel and guards stay the machine's; the other axis is held, as by an offset."""
+    """Kind, amplitude and time come from the experiment; limit, travel and guards from the machine; the other axis is held at rest."""
     held = OWN.axes["y"].model_copy(update={"kind": "noise", "offset": 1.0, "slow": 0.5})
     found = with_experiment(OWN.model_copy(update={"axes": {**OWN.axes, "y": held}}), document(rate=2000.04), "next.yaml").settings
     x, y = found.axes["x"], found.axes["y"]
@@ -72,14 +72,14 @@ def test_an_experiment_takes_the_place_of_the_signal_and_not_of_the_limits() -> 
     ],
 )
 def test_a_file_that_asks_for_more_is_refused_in_one_line(changes: dict[str, Any], words: str) -> None:
-    """Which value, what is allowed, what to do."""
+    """The error gives the value, the allowed range and the next action."""
     with pytest.raises(BadInput) as refusal:
         with_experiment(OWN, document(**changes), "next.yaml")
     assert words in str(refusal.value) and "\n" not in str(refusal.value)
 
 
 def test_a_robot_that_takes_positions_or_trajectories_is_refused_one() -> None:
-    """Its controller holds it where it is told; the same motion goes there as a trajectory."""
+    """Its controller holds the position; such an axis gets the same motion as a trajectory."""
     axis = AxisExcitation(kind="multisine", low=0.5, high=5.0, limit=0.05, rms=0.0, max_speed=0.2, max_acceleration=2.0)
     for command in ("forward", "joint_trajectory"):
         robot = ExcitationSettings(axes={"x": axis}, output="commands", interface="position", command=command)
@@ -88,7 +88,7 @@ def test_a_robot_that_takes_positions_or_trajectories_is_refused_one() -> None:
 
 
 def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None:
-    """The file of xy-sysid next is what the node loads."""
+    """The node loads the file of xy-sysid next."""
     limits = MachineLimits(voltage=5.0, travel=(-0.14, 0.14))
     narrow = OWN.model_copy(update={"axes": {"x": AxisExcitation(limit=2.6666663)}})
     made = NextExperiment(
@@ -111,7 +111,7 @@ def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None
 
 @pytest.mark.parametrize(("place", "moves"), [(0.015, True), (-0.025, True), (0.021, False), (-0.04, False)])
 def test_an_experiment_begins_only_where_it_was_designed_to(place: float, moves: bool) -> None:
-    """Designed about 0 and run elsewhere it would go where it was promised not to go: it stops before the first volt, and says where to move."""
+    """An experiment designed around 0 could leave its limits from another start: it stops before any voltage, and says where to move."""
     taken = with_experiment(OWN, document(), "next.yaml")
     drive = Drive(taken.settings, starts=taken.starts)
     drive.start()
@@ -124,7 +124,7 @@ def test_an_experiment_begins_only_where_it_was_designed_to(place: float, moves:
 
 
 def test_limits_travel_and_guards_are_no_settings_of_an_experiment() -> None:
-    """Whoever sets back what experiments have changed leaves these to the operator."""
+    """A reset of the settings of experiments does not change those of the operator."""
     changed = {
         name
         for name in ("duration", "experiment", "ramp", "watchdog", "x.rms", "x.slow", "x.limit", "x.travel_max", "x.brake_voltage")

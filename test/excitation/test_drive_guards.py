@@ -1,4 +1,4 @@
-"""Drive: what is returned is what is applied, it starts and ends softly, and it never leaves the travel."""
+"""Drive: the returned voltage is the applied one, it starts and ends softly, and the axis never leaves the travel."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def place(seq: int, values: list[float]) -> Block:
 
 
 def running(what: ExcitationSettings, position: float = 0.0) -> Drive:
-    """A drive that has seen where it stands."""
+    """A drive that has received a position."""
     drive = Drive(what)
     drive.start()
     assert drive.see(place(0, [position] * 2))
@@ -93,7 +93,7 @@ def test_nothing_moves_before_start_and_before_the_first_position() -> None:
 
 
 def test_positions_far_ahead_of_the_voltage_are_of_another_source() -> None:
-    """A machine that still counts as the voltage of before: not taken, so that its next positions, with this voltage's counter, are."""
+    """Positions with the counter of an earlier voltage are not used; the next ones, with the counter of this voltage, are."""
     drive = Drive(settings(ramp=0.0))
     drive.start()
     assert not drive.see(place(36_000, [0.01]))
@@ -110,7 +110,7 @@ def test_the_ramp_fades_in_smoothly() -> None:
 
 
 def test_centring_pulls_to_the_start_and_zero_is_open_loop() -> None:
-    """Weak centring feedback relative to the start position; 0 leaves the loop open."""
+    """Weak centring feedback relative to the start position; with 0 the loop is open."""
     drive = running(settings({"kind": "off", "centring": 3.0}, ramp=0.0), position=0.02)
     assert not drive.next(N).values.any()
     drive.see(place(25, [0.03] * 2))
@@ -138,12 +138,12 @@ def test_the_soft_limits_stop_an_axis_driven_at_the_end(volts: float, ahead: int
     assert axis.furthest < 0.14
     assert np.abs(voltage).max() > 0.8 * abs(volts)
     assert drive.report().braked[0] > 0
-    assert np.abs(position[-2000:]).min() > 0.09  # held before the end, not thrown back
+    assert np.abs(position[-2000:]).min() > 0.09  # held before the end, without a jump back
 
 
 @pytest.mark.parametrize("ahead", [1, 3])
 def test_loud_noise_with_an_offset_never_passes_the_end(ahead: int) -> None:
-    """The same under loud slow noise, in both directions, for a minute."""
+    """The same under strong slow noise, in both directions, for a minute."""
     for volts, seed in ((2.0, 3), (-2.0, 4)):
         axis = Axis()
         drive_axis(Drive(settings({"rms": 3.0, "high": 20.0, "offset": volts, "centring": 0.0, "seed": seed})), axis, 30.0, ahead)
@@ -151,14 +151,14 @@ def test_loud_noise_with_an_offset_never_passes_the_end(ahead: int) -> None:
 
 
 def test_beyond_a_limit_the_push_is_inward() -> None:
-    """At and beyond a soft limit: inward brake voltage, whatever the signal wants."""
+    """At and beyond a soft limit: inward brake voltage for any signal."""
     for side in (1, -1):
         drive = running(settings({"kind": "off", "offset": 4.0 * side, "brake_voltage": 0.8, "centring": 0.0}, ramp=0.0), position=0.145 * side)
         assert drive.next(N).values[:, 0] == pytest.approx(np.full(N, -0.8 * side))
 
 
 def test_the_amplitude_limit_comes_last() -> None:
-    """No sample leaves the limit, after every other part, and the clipped samples are counted."""
+    """No sample exceeds the limit, which is applied last, and the clipped samples are counted."""
     drive = running(settings({"rms": 3.0, "offset": 2.0, "limit": 2.5}, ramp=0.0))
     u = drive.next(4000).values
     assert np.abs(u).max() == 2.5
@@ -168,7 +168,7 @@ def test_the_amplitude_limit_comes_last() -> None:
 
 
 def test_positions_that_stop_trip_the_watchdog() -> None:
-    """No position for 50 ms while active: ramp to zero in abort_ramp, then stopped, saying why; zeros last."""
+    """No position for 50 ms while active: ramp to zero in abort_ramp, then stopped with a reason; the last samples are zeros."""
     drive = running(settings({"kind": "off", "offset": 1.0}, ramp=0.0))
     now, sent = 0.0, []
     while drive.state != "stopped" and now < 1:
@@ -183,7 +183,7 @@ def test_positions_that_stop_trip_the_watchdog() -> None:
 
 
 def test_positions_that_are_not_numbers_count_as_none() -> None:
-    """NaN and absurd positions trip the watchdog like silence, and are never used."""
+    """NaN and impossible positions trip the watchdog like missing ones, and are never used."""
     drive = running(settings({"kind": "off", "offset": 1.0}, ramp=0.0))
     for i, bad in enumerate([np.nan, 1e9, np.inf, -np.inf] * 5):
         drive.tick(i * 0.01)
@@ -193,7 +193,7 @@ def test_positions_that_are_not_numbers_count_as_none() -> None:
 
 
 def test_a_pause_of_the_caller_is_not_blamed_on_the_encoder() -> None:
-    """Positions that waited while the caller slept are read before they are missed."""
+    """Positions that arrived while the caller was asleep are read before the watchdog checks."""
     drive = running(settings(ramp=0.0))
     drive.tick(0.0)
     drive.tick(5.0)
@@ -204,7 +204,7 @@ def test_a_pause_of_the_caller_is_not_blamed_on_the_encoder() -> None:
 
 
 def test_a_machine_that_never_answers_is_named_and_nothing_moved() -> None:
-    """When the machine never answers: says so, at 0 V all the time."""
+    """If the machine never answers: a reason, at 0 V all the time."""
     drive = Drive(settings(patience=0.2))
     drive.start()
     for i in range(100):
@@ -237,7 +237,7 @@ def test_a_quicker_stop_replaces_a_slower_one_without_a_jump() -> None:
 
 
 def test_loudness_and_limits_change_while_running_and_the_rest_does_not() -> None:
-    """rms and limits live, along a line over a block; the kind of signal only while inactive, with a sentence."""
+    """rms and limits change during motion, linearly over a block; the kind of signal only while inactive, otherwise with a reason."""
     before = settings({"kind": "off", "offset": 1.0}, ramp=0.0)
     drive = running(before)
     drive.next(N)
@@ -249,7 +249,7 @@ def test_loudness_and_limits_change_while_running_and_the_rest_does_not() -> Non
 
 
 def test_the_axes_are_matched_by_name_and_do_not_touch_each_other() -> None:
-    """Per axis independent: another axis' settings change nothing, columns in any order, a missing one is no position."""
+    """Axes are independent: settings of another axis have no effect, columns may be in any order, a missing one is no position."""
     two = ExcitationSettings(axes={"x": AxisExcitation(), "y": AxisExcitation(seed=2, rms=3.0)}, ramp=0.0)
     drive = Drive(two)
     drive.start()
@@ -293,7 +293,7 @@ def axis_settings(draw: st.DrawFn) -> dict[str, Any]:
     stop=st.integers(0, 12),
 )
 def test_never_outward_beyond_a_limit(x: dict[str, Any], ramp: float, places: list[float], late: int, stop: int) -> None:
-    """Whatever the settings, the motion, the age of the position and the state: an axis last seen at or beyond a limit gets no outward voltage."""
+    """For any settings, motion, age of the position and state: an axis last measured at or beyond a limit gets no outward voltage."""
     try:
         drive = Drive(settings(x, ramp=ramp))
     except BadInput as refused:
@@ -318,9 +318,9 @@ def test_never_outward_beyond_a_limit(x: dict[str, Any], ramp: float, places: li
 
 
 def test_two_forecasts_at_once_leave_the_nearer_end_its_way() -> None:
-    """Loud voltage to both sides makes both ends look near: 5 mm beyond the upper limit the voltage is inward all the same."""
+    """Strong voltage to both sides brings both brake zones close: 5 mm beyond the upper limit the voltage is still inward."""
     drive = running(settings({"kind": "off", "offset": -60.0, "centring": 0.0, "limit": 10.0, "travel_min": -0.14, "travel_max": 0.14}, ramp=0.0))
-    for k in range(1, 6):  # it has shown that it is fast, both ways
+    for k in range(1, 6):  # it has moved fast in both directions
         drive.next(N)
         drive.see(place(k * N, [0.1 * (-1) ** k, 0.145]))
     assert drive._travel.within(np.full((N, 1), 3.0), drive.seq).max() <= 0
@@ -328,7 +328,7 @@ def test_two_forecasts_at_once_leave_the_nearer_end_its_way() -> None:
 
 @pytest.mark.parametrize(("centring", "gain", "allowed"), [(2.0, 0.0, True), (1e4, 0.0, False), (1e3, 0.097, False), (1e3, 0.001, True)])
 def test_centring_that_would_make_the_axis_swing_is_refused(centring: float, gain: float, allowed: bool) -> None:
-    """From what is known of the machine, or from limit and travel: the sentence gives the greatest value; while active, too."""
+    """From the known machine, or from limit and travel: the sentence gives the largest value, also while active."""
     wanted = settings({"centring": centring, "velocity_gain": gain})
     drive = running(settings({"velocity_gain": gain}))
     if allowed:
@@ -342,7 +342,7 @@ def test_centring_that_would_make_the_axis_swing_is_refused(centring: float, gai
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_outside_and_not_coming_back_ends_at_zero_volts(side: int) -> None:
-    """Beyond the soft limit for half a second without coming back: zero volts, with the reason; one that comes back goes on."""
+    """Beyond the soft limit for half a second without return: zero volts, with the reason; an axis that returns continues."""
     for speed, ends in ((0.0, True), (0.05, False)):
         drive = running(settings({"kind": "off"}, ramp=0.0), position=0.145 * side)
         for k in range(1, 80):
@@ -355,7 +355,7 @@ def test_outside_and_not_coming_back_ends_at_zero_volts(side: int) -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_outward_motion_that_full_inward_voltage_does_not_slow_ends_at_zero_volts(side: int) -> None:
-    """A sign that is wrong pushes outward: within 120 ms of pushing it ends; an axis that slows down is not stopped."""
+    """A wrong sign drives outward: it ends within 120 ms; an axis that slows down is not stopped."""
     for slowing, ends in ((1.0, True), (0.7, False)):
         drive = running(settings({"kind": "off", "brake_voltage": 2.0}, ramp=0.0), position=0.11 * side)
         position, speed, pushed = 0.11, 0.2, 0

@@ -1,4 +1,4 @@
-"""Pacing: blocks by the clock without drift or burst, and in lockstep exactly the positions that a block may know."""
+"""Pacing: blocks by the clock without drift or burst; in lockstep, each block uses exactly the allowed positions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_block_k_is_due_at_start_plus_k_periods_without_drift() -> None:
 
 
 def test_a_short_stall_is_caught_up_and_a_long_one_skipped() -> None:
-    """If late, catch up at most a few blocks, else skip time, never burst."""
+    """If late, catch up at most a few blocks, otherwise skip time; never a burst."""
     clock = Clock(0.01, 0.0)
     clock.count(0.0)
     assert clock.skip(0.029) == 0 and clock.due(0.029) == 2 <= CATCH_UP
@@ -43,7 +43,7 @@ def test_a_stream_that_may_not_skip_slips() -> None:
 
 
 def test_answers_are_handed_out_up_to_a_sample_however_they_arrive() -> None:
-    """Deterministic: block k knows the positions up to block k - ahead, whatever the size of the messages."""
+    """Deterministic: block k uses the positions up to block k - ahead, for any size of the messages."""
     whole, pieces = Answers(), Answers()
     whole.add(rows(0, 60))
     got = []
@@ -59,7 +59,7 @@ def test_answers_are_handed_out_up_to_a_sample_however_they_arrive() -> None:
 
 
 def test_lost_repeated_and_broken_answers_do_not_confuse() -> None:
-    """A lost block gives what there is; an old or NaN counter is not an answer."""
+    """After a lost block the available positions are used; an old or NaN counter is not an answer."""
     answers = Answers()
     answers.add(rows(0, 20))
     assert answers.up_to(19) is not None

@@ -1,4 +1,4 @@
-"""Excitation: every signal is the same stream in any chunking, has its power where it says, and refuses what cannot be."""
+"""Excitation: every signal is the same in any chunking, has its power in the stated band, and refuses impossible settings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RATE = 2000.0
 
 
 def in_chunks(settings: AxisExcitation, total: int, seed: int) -> FloatArray:
-    """The stream asked for in random pieces, empty ones and single samples included."""
+    """The stream in random pieces, including empty ones and single samples."""
     stream, random, pieces = signal(settings, RATE), np.random.default_rng(seed), []
     left = total
     while left:
@@ -32,7 +32,7 @@ def in_chunks(settings: AxisExcitation, total: int, seed: int) -> FloatArray:
 
 @pytest.mark.parametrize("kind", list(MAKERS))
 def test_any_chunking_gives_the_same_stream_bit_for_bit(kind: str) -> None:
-    """`next(n) -> block`: the stream does not depend on how it is asked for."""
+    """`next(n) -> block`: the stream does not depend on the block sizes."""
     settings = AxisExcitation(kind=kind, period=1.3)
     whole = signal(settings, RATE).next(30_000)
     assert whole.shape == (30_000,) and whole.dtype == np.float64 and np.isfinite(whole).all()
@@ -173,7 +173,7 @@ def test_a_prbs_is_of_maximal_length_and_two_levels() -> None:
 
 
 def test_impulse_and_step_start_at_rest_and_alternate() -> None:
-    """Impulse and step: a rest first, then up and down in turn, so that an integrating axis comes back."""
+    """Impulse and step: a rest first, then up and down in turn, so that an integrating axis returns."""
     impulse = signal(AxisExcitation(kind="impulse", rms=3.0, period=0.1), RATE).next(900)
     assert np.flatnonzero(impulse).tolist() == [199, 399, 599, 799] and impulse[[199, 399]].tolist() == [3.0, -3.0]
     step = signal(AxisExcitation(kind="step", rms=3.0, period=0.1), RATE).next(800)
@@ -195,7 +195,7 @@ def test_impulse_and_step_start_at_rest_and_alternate() -> None:
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(values: dict[str, object], rate: float, words: str) -> None:
-    """High is limited below Nyquist; periods and bands that do not fit the rate are named with what is allowed."""
+    """High is limited below Nyquist; periods and bands that do not fit the rate give an error with the allowed range."""
     with pytest.raises(BadInput) as caught:
         signal(AxisExcitation.model_validate(values), rate)
     assert words in str(caught.value) and "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""First run: small pushes, each looked at before the next; what is wrong is found at the first motion, what is right is measured."""
+"""First run: small steps, each checked before the next; wrong wiring is found at the first motion, a right machine is measured."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from xy_sysid.samples.block import FloatArray
 
 
 def push(machine: Machine, what: Push, axes: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
-    """Rest, forth, rest, back, rest, with the edges that a change of the offset has: a line over one block."""
+    """Rest, forth, rest, back, rest, with the edges of a change of the offset: linear over one block."""
     shape = np.concatenate([np.zeros(200), np.ones(300), np.zeros(200), -np.ones(300), np.zeros(200)])
     shape = np.convolve(shape, np.ones(20) / 20)[: shape.size]
     voltage = np.zeros((shape.size, len(axes)))
@@ -23,7 +23,7 @@ def push(machine: Machine, what: Push, axes: tuple[str, ...]) -> tuple[FloatArra
 
 
 def first_run(machine: Machine, wrong: Any = lambda position: position, **axis: Any) -> tuple[FirstRun, list[PushResult]]:
-    """The whole of it; wrong: what the wiring makes of the positions."""
+    """The full first run; wrong: effect of the wiring on the positions."""
     run, answers = FirstRun(settings({"rms": 1.0, **axis})), []
     while (what := run.next()) is not None:
         voltage, position = push(machine, what, run.axes)
@@ -32,7 +32,7 @@ def first_run(machine: Machine, wrong: Any = lambda position: position, **axis: 
 
 
 def test_it_grows_in_small_steps_and_finds_gain_lag_and_friction() -> None:
-    """On the rigid table: every push at most 1.6 times the one before, gain within 3 %, delay and lag within 1 ms, one sentence each."""
+    """On the rigid table: every step at most 1.6 times the previous one, gain within 3 %, delay and lag within 1 ms, one sentence each."""
     run, answers = first_run(Machine.from_file("rigid.yaml"))
     assert run.problem == "" and {answer.push.axis for answer in answers} == {"x", "y"}
     volts = np.array([answer.push.volts for answer in answers if answer.push.axis == "x"])
@@ -45,7 +45,7 @@ def test_it_grows_in_small_steps_and_finds_gain_lag_and_friction() -> None:
 
 
 def test_friction_is_told_from_a_fault_and_measured() -> None:
-    """Below breakaway it says 'at rest' and goes on; then the friction is known within 15 %."""
+    """Below breakaway it says 'at rest' and continues; then the friction is found within 15 %."""
     run, answers = first_run(Machine.from_file("rigid.yaml").with_parts({"coulomb_friction": 0.4}))
     assert run.problem == "" and "at rest" in answers[0].sentence
     found = run.found("x")
@@ -65,7 +65,7 @@ def test_friction_is_told_from_a_fault_and_measured() -> None:
     ids=["sign", "unit", "swapped", "late", "not a number"],
 )
 def test_what_is_wired_wrong_ends_it_at_the_first_motion(wrong: Any, words: str) -> None:
-    """Sign, unit, swapped axes: found within the first push that moves, after less than a millimetre, and no louder push follows."""
+    """Sign, unit, swapped axes: found at the first step with motion, after less than a millimetre, and no larger step follows."""
     machine = Machine.from_file("rigid.yaml")
     run, answers = first_run(machine, wrong)
     assert words in run.problem and run.next() is None
@@ -73,20 +73,20 @@ def test_what_is_wired_wrong_ends_it_at_the_first_motion(wrong: Any, words: str)
 
 
 def test_a_position_in_kilometres_is_noticed() -> None:
-    """1000 times too small: the axis moves as if its travel took minutes; ended with the question for the unit."""
+    """1000 times too small: the axis seems to need minutes for its travel; the run ends with a question about the unit."""
     run, _ = first_run(Machine.from_file("rigid.yaml", clean=True), lambda position: position / 1000)
     assert "is the position in m?" in run.problem
 
 
 def test_no_push_goes_further_than_half_of_the_free_travel() -> None:
-    """A short axis: the loud pushes are left out."""
+    """A short axis: the large steps are left out."""
     run, answers = first_run(Machine.from_file("rigid.yaml"), travel_min=-0.02, travel_max=0.02, brake=0.005, rms=5.0)
     assert run.problem == "" and max(abs(answer.moved[0]) for answer in answers) < 0.015
     assert max(answer.push.volts for answer in answers) < 2.0
 
 
 def test_an_axis_that_never_moves_is_named() -> None:
-    """Nothing moves up to twice rms: said, with what to do, and no number is made up."""
+    """No motion up to twice rms: a sentence with the next action, and no numbers."""
     run, _ = first_run(Machine.from_file("rigid.yaml").with_parts({"coulomb_friction": 8.0}))
     assert run.problem == "" and run.found("x").velocity_gain is None and "did not move up to 2 V: raise rms" in run.summary("x")
 
@@ -94,13 +94,13 @@ def test_an_axis_that_never_moves_is_named() -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("load", [0.3, -0.3])
 def test_a_load_that_falls_is_no_fault_of_the_wires(load: float, sign: float) -> None:
-    """It moves at 0 V, before any push: a load drives it, and nobody is told to swap wires, whichever way they are."""
+    """It moves at 0 V, before any step: a load drives it, and the answer does not suggest to swap wires, for either wiring."""
     run, answers = first_run(Machine.from_file("rigid.yaml").with_parts({"constant_load": load}), lambda position: sign * position)
     assert len(answers) == 1 and "at 0 V, before any push: a load drives it" in run.problem and "swap" not in run.problem
 
 
 def pushed(law: Any, lag: float = 0.1, gain: float = 0.1) -> FirstRun:
-    """The first run of an axis that answers by speed' = (gain voltage - speed) / lag + law(place, speed, voltage, time)."""
+    """The first run of an axis with speed' = (gain voltage - speed) / lag + law(place, speed, voltage, time)."""
     run = FirstRun(settings({"rms": 1.0}, axes=("x",)))
     shape = np.convolve(np.concatenate([np.zeros(200), np.ones(300), np.zeros(200), -np.ones(300), np.zeros(200)]), np.ones(20) / 20)[:1200]
     while (what := run.next()) is not None:
@@ -114,13 +114,13 @@ def pushed(law: Any, lag: float = 0.1, gain: float = 0.1) -> FirstRun:
 
 
 def test_a_load_that_tips_over_is_no_fault_of_the_wires() -> None:
-    """Balanced until the first push, then it runs off in that direction, whatever the next push says."""
+    """In balance until the first step, then it moves on in that direction in spite of the next step."""
     run = pushed(lambda place, speed, volts, time: 1500.0 * place)
     assert "a load drives it (it hangs or tips over)" in run.problem and "swap" not in run.problem
 
 
 def test_a_brake_that_opens_with_the_voltage_leaves_both_causes_open() -> None:
-    """It falls during the push forth alone: both causes are named, with the test that tells which."""
+    """It falls only during the step forth: both causes are named, with a test that distinguishes them."""
     run = pushed(lambda place, speed, volts, time: -20.0 * (0.1 < time < 0.25) - (volts + 1e3 * speed) * (time > 0.25))
     assert "to minus at plus volts, and not the other way" in run.problem
     assert "push it by hand" in run.problem and "load" in run.problem and "swap the motor's wires" in run.problem
@@ -128,26 +128,26 @@ def test_a_brake_that_opens_with_the_voltage_leaves_both_causes_open() -> None:
 
 @pytest.mark.parametrize(("gain", "lag"), [(0.1, 0.005), (0.5, 0.5), (5.0, 5.0)])
 def test_an_axis_that_coasts_is_seen_the_right_way(gain: float, lag: float) -> None:
-    """Slow poles and free masses go on after a push: no word of wires or loads while plus is plus, and the wires if it is not."""
+    """Slow poles and free masses move on after a step: wires are blamed only if the sign is wrong."""
     assert "swap" not in pushed(lambda *_: 0.0, lag, gain).problem and "load drives" not in pushed(lambda *_: 0.0, lag, gain).problem
     assert "swap the motor's wires" in pushed(lambda *_: 0.0, lag, -gain).problem
 
 
 def test_a_sticky_axis_that_gives_and_comes_back_is_not_asked_for_its_unit() -> None:
-    """A contact that sticks moves by micrometres and springs back: it is held, and louder pushes follow."""
+    """A sticking contact moves by micrometres and springs back: it counts as held, and larger steps follow."""
     run = pushed(lambda place, speed, volts, time: -4e4 * place, lag=0.01)
     assert run.problem == "" and run.found("x").velocity_gain is None
 
 
 def test_an_axis_that_moves_too_little_is_asked_for_both_causes() -> None:
-    """It stays where it was moved, and that is hardly anywhere: its unit or friction, and the test that tells which."""
+    """It hardly moves and stays there: its unit or friction, with a test that distinguishes them."""
     run, _ = first_run(Machine.from_file("rigid.yaml", clean=True), lambda position: position / 1000)
     assert "is the position in m?" in run.problem and "by hand" in run.problem and "friction" in run.problem
 
 
 @pytest.mark.parametrize("moved", [(0.0, -1e-3), (-5e-7, -1e-3)])
 def test_a_push_that_moves_it_only_back_is_no_division_by_zero(moved: tuple[float, float]) -> None:
-    """As a resting axis with a load or asymmetric friction does: said, and the next push follows."""
+    """As a resting axis with a load or asymmetric friction does: a sentence says so, and the next step follows."""
     run = FirstRun(settings({"rms": 1.0}, axes=("x",)))
     what = run.next()
     assert what is not None

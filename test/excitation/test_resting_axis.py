@@ -1,4 +1,4 @@
-"""No guard applies more than was asked of an axis that does not move outward, however its encoder flickers."""
+"""No guard applies more than the requested voltage to an axis that does not move outward, with any encoder flicker."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def flickering(place: FloatArray, noise: float, random: np.random.Generator) -> 
 
 @pytest.mark.parametrize(("driven", "rms", "start", "noise"), CASES)
 def test_no_guard_applies_more_than_was_asked(driven: str, rms: float, start: float, noise: float) -> None:
-    """One axis is driven in the middle, and gets exactly its signal; the other rests there or in the brake zone, then is asked for 25 mV."""
+    """One axis is driven in the middle, and gets exactly its signal; the other rests there or in the brake zone, then gets 25 mV."""
     middle = {"centring": 0.0, "limit": 10.0, "travel_min": -0.1, "travel_max": 0.1, "brake": 0.04, "brake_voltage": 5.0}
     axes = {name: AxisExcitation(**middle, kind="noise" if name == driven else "off", low=20.0, rms=rms) for name in ("x", "y")}
     settings = ExcitationSettings(axes=axes, ramp=0.0)
@@ -57,7 +57,7 @@ def test_no_guard_applies_more_than_was_asked(driven: str, rms: float, start: fl
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("rms", [0.1, 1.0])
 def test_an_axis_that_moves_inward_through_the_brake_zone_gets_no_more_than_was_asked(side: float, rms: float) -> None:
-    """From 18 mm before the end towards the middle, with noise of ten counts: what pushes inward is as asked, what pushes outward is made less."""
+    """From 18 mm before the end towards the middle, with noise of ten counts: inward voltage is unchanged, outward voltage is reduced."""
     axis = AxisExcitation(centring=0.0, limit=10.0, travel_min=-0.1, travel_max=0.1, brake=0.04, brake_voltage=5.0, low=20.0, rms=rms)
     drive, wanted, random = Drive(ExcitationSettings(axes={"x": axis}, ramp=0.0)), signal(axis, RATE), np.random.default_rng(4)
     drive.start()
@@ -73,7 +73,7 @@ def test_an_axis_that_moves_inward_through_the_brake_zone_gets_no_more_than_was_
 
 
 def test_an_axis_that_coasts_outward_is_braked_though_nothing_is_asked() -> None:
-    """Motion beyond the noise, towards an end at 0 V: the guard brakes with what it has."""
+    """Motion above the noise, towards an end at 0 V: the guard brakes."""
     axis = AxisExcitation(kind="off", centring=0.0, travel_min=-0.1, travel_max=0.1, brake=0.04, brake_voltage=2.0)
     drive, least = Drive(ExcitationSettings(axes={"x": axis}, ramp=0.0)), 0.0
     drive.start()
@@ -86,7 +86,7 @@ def test_an_axis_that_coasts_outward_is_braked_though_nothing_is_asked() -> None
 
 @pytest.mark.parametrize("sigma", [0.0, 2e-7, 3e-6, 1e-4])
 def test_what_needs_no_motion_covers_the_noise_and_hardly_more(sigma: float) -> None:
-    """All readings of a resting axis differ by less; steady motion does not make it larger."""
+    """The estimated noise bounds all readings of a resting axis; steady motion does not increase it."""
     random = np.random.default_rng(1)
     for speed in (0.0, 0.2):
         noise, rest = EncoderNoise(1), np.zeros((4000, 1))
@@ -99,11 +99,11 @@ def test_what_needs_no_motion_covers_the_noise_and_hardly_more(sigma: float) -> 
         assert noise.still[0] < 12 * (sigma + COUNT) + 2 * speed / RATE
 
 
-LOOKED_AT = 11  # positions of a tenth of a second, one of each block of 10 ms, among which the travel guard looks for motion
+LOOKED_AT = 11  # positions of the last 0.1 s, one for each block of 10 ms, in which the travel guard looks for motion
 
 
 def test_noise_is_not_taken_for_motion_however_long_the_axis_rests() -> None:
-    """A quarter of an hour of blocks, with noise far beyond a count: no position is further from those before than noise explains."""
+    """A quarter of an hour of blocks, with noise far above a count: no position differs from earlier ones by more than the noise."""
     random, noise = np.random.default_rng(5), EncoderNoise(1)
     noise.saw(flickering(np.zeros((4000, 1)), 1e-4, random))
     places = flickering(np.zeros(90_000), 1e-4, random)
@@ -113,7 +113,7 @@ def test_noise_is_not_taken_for_motion_however_long_the_axis_rests() -> None:
 
 @pytest.mark.parametrize("rows", [1, 2, 20])
 def test_the_first_positions_are_not_taken_for_motion_either(rows: int) -> None:
-    """A driver may send one position at a time: what few of them tell of the noise is not believed to be all of it."""
+    """A driver may send single positions: a noise estimate from few of them is enlarged."""
     for seed in range(200):
         random, noise, last = np.random.default_rng(seed), EncoderNoise(1), list[float]()
         for _ in range(24):

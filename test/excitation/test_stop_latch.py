@@ -1,4 +1,4 @@
-"""STOP is on while anybody holds it; who is overridden is named before."""
+"""STOP is on while any node holds it; an override first names the holders."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ A, B = b"a", b"b"
 
 
 def test_only_who_set_it_releases_it() -> None:
-    """False from another is nothing; false from the same releases; messages that come by a second way are no news."""
+    """False from another node has no effect; false from the same node releases; duplicates of a message are ignored."""
     latch = StopLatch()
     latch.heard(A, 1, True)
     latch.heard(B, 1, True)
     latch.heard(B, 2, False)
     assert latch.holders == (A,)
     latch.heard(A, 2, False)
-    latch.heard(A, 1, True)  # the same message as at first, on another subscription
+    latch.heard(A, 1, True)  # the first message again, on another subscription
     assert list(latch.holders) == []
 
 
 def test_an_operator_overrides_whom_he_was_told_of_and_nobody_else() -> None:
-    """The first call names the holders; one who comes in between is named anew; a late second call is a first one."""
+    """The first call names the holders; a new holder in between is named again; a late second call counts as a first one."""
     latch = StopLatch()
     assert latch.release(0.0, bytes.decode) == (True, "STOP is not on")
     latch.heard(A, 1, True)
@@ -41,7 +41,7 @@ def test_an_operator_overrides_whom_he_was_told_of_and_nobody_else() -> None:
 
 @given(st.lists(st.tuples(st.integers(0, 300), st.booleans()), max_size=400))
 def test_it_is_on_exactly_while_somebody_said_so_last(messages: list[tuple[int, bool]]) -> None:
-    """Whoever comes and goes, however many: nobody who holds it is forgotten."""
+    """With any number of nodes that appear and disappear, no holder is forgotten."""
     latch, last = StopLatch(), dict[int, bool]()
     for number, (publisher, on) in enumerate(messages):
         latch.heard(str(publisher).encode(), number, on)

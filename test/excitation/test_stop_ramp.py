@@ -1,4 +1,4 @@
-"""STOP fades out within a cap of its own, whatever the ramps are and whatever is under way."""
+"""STOP fades out within its own time limit, for any ramps and in any state."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from xy_sysid.samples.block import Block
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
 CAP = 0.1  # s
-SLOW = {"abort_ramp": 10.0}  # the longest that is allowed
+SLOW = {"abort_ramp": 10.0}  # the longest allowed
 WAYS: dict[str, dict[str, Any]] = {
     "blocks": {},
     "effort": {"output": "commands", "rate": 200.0, "block": 1},
@@ -24,7 +24,7 @@ WAYS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("before", ["driving", "told to end", "deactivated", "a guard has tripped", "ramps set live"])
 @pytest.mark.parametrize("way", WAYS)
 def test_stop_is_over_in_a_tenth_of_a_second(way: str, before: str) -> None:
-    """The longest ramps that are allowed, set before or while it drives: after 0.1 s and the block under way, what is sent is what is safe."""
+    """With the longest allowed ramps, set before or during driving: after 0.1 s and the current block, the output is safe."""
     axis = AxisExcitation(kind="off", offset=0.05, centring=0.0, limit=0.1, rms=0.05)
     settings = ExcitationSettings(axes={"x": axis}, **{**WAYS[way], "ramp": 0.0, "abort_ramp": 0.02})
     slow = settings.model_copy(update=SLOW)

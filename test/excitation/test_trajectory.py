@@ -1,4 +1,4 @@
-"""Trajectories that excite a robot within limits of position, speed and acceleration, and what comes of them."""
+"""Trajectories that excite a robot within limits of position, speed and acceleration, and identification from them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_it_is_as_large_as_the_tightest_limit_allows(kind: Literal["multisine", 
 
 
 def test_what_cannot_be_held_is_refused() -> None:
-    """Too slow a band for the time, too few points for it, limits that are none."""
+    """A band too slow for the time, too few points for it, invalid limits."""
     with pytest.raises(BadInput, match="cycles of the lowest"):
         trajectory("multisine", (0.05, 8.0), 20.0, RATE, LIMITS)
     with pytest.raises(BadInput, match="points a second"):
@@ -64,7 +64,7 @@ def test_a_joint_behind_its_controller_is_identified_with_the_reference_as_instr
 
 
 def test_the_command_writes_the_message_and_the_reference(tmp_path: Path) -> None:
-    """trajectory_msgs/JointTrajectory as ros2 topic pub takes it; the tightest limit is named; what is there is not replaced."""
+    """trajectory_msgs/JointTrajectory for ros2 topic pub; the limiting quantity is named; existing files are not replaced."""
     options = ("--joint", "pan", "--position", "0.5", "--speed", "1", "--acceleration", "8", "--high", "5", "--start", "0.2")
     said = cli("trajectory", tmp_path / "excite.yaml", *options)
     assert said.code == 0 and "limit of" in said.out

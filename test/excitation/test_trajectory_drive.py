@@ -1,4 +1,4 @@
-"""The drive of a robot that takes only trajectories, and a controller that follows what it is told: never outside the limits, always to rest."""
+"""The drive of a robot that accepts only trajectories, and an exact controller: never outside the limits, always to rest."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
 RATE, START = 200.0, 0.4
-FINE = 5  # places in a sample
+FINE = 5  # positions per sample
 JOINT: dict[str, Any] = {
     "kind": "multisine",
     "rms": 0.0,
@@ -38,7 +38,7 @@ def settings(**x: Any) -> ExcitationSettings:
 
 
 class Robot:
-    """A controller that hears the drive, and a joint that follows it exactly; its clock may be late."""
+    """A controller that receives the drive's messages, and a joint that follows it exactly; its clock may be late."""
 
     def __init__(self, drive: TrajectoryDrive, late: float = 0.0) -> None:
         self.drive, self.late, self.following = drive, late, Following(["x"])
@@ -52,7 +52,7 @@ class Robot:
         return self.drive.see(Block(("x",), at, at / RATE, np.array([[self.place]])))
 
     def hear(self, points: MotionPoints) -> None:
-        """Take a message as it comes."""
+        """Receive a message."""
         made = [
             Point(at=(s - points.sample[0]) / RATE, position=p, speed=v, push=a if k < points.brakes else np.empty(0))
             for k, (s, p, v, a) in enumerate(zip(points.sample, points.position, points.speed, points.acceleration, strict=True))
@@ -66,7 +66,7 @@ class Robot:
         return 1000.0 + (self.drive.seq - 1) / RATE - self.late
 
     def go(self, samples: int, deaf: bool = False, held_up: int = 0) -> FloatArray:
-        """(samples * FINE,) places; deaf: nothing is heard; held_up: samples that the first step comes late."""
+        """(samples * FINE,) positions; deaf: no message is received; held_up: delay of the first step, samples."""
         before = len(self.path)
         for k in range(samples):
             last = self.clock()
@@ -82,11 +82,11 @@ class Robot:
         return np.array(self.path[before:])
 
     def limits_kept(self) -> None:
-        """Position, speed and acceleration of all the way, by differences."""
+        """Position, speed and acceleration of the full motion, by differences."""
         path, step = np.array(self.path), 1.0 / FINE / RATE
         assert np.abs(path - START).max() <= JOINT["limit"] * (1 + 1e-9)
         assert np.abs(np.diff(path)).max() / step <= JOINT["max_speed"] * 1.001
-        assert np.abs(np.diff(path, 2)).max() / step**2 <= JOINT["max_acceleration"] * 1.02  # the points are 25 in a period of the highest frequency
+        assert np.abs(np.diff(path, 2)).max() / step**2 <= JOINT["max_acceleration"] * 1.02  # 25 points in a period of the highest frequency
 
 
 def robot(late: float = 0.0, **x: Any) -> Robot:
@@ -110,14 +110,14 @@ def test_pieces_are_one_motion_within_the_limits(kind: str, late: float) -> None
 
 @pytest.mark.parametrize(("late", "words"), [(-0.2, "stamped 0.2 s after it comes"), (0.12, "stamped 0.12 s before it comes")])
 def test_a_robot_whose_clock_is_another_is_not_moved(late: float, words: str) -> None:
-    """Pieces would not fit together there: its joint states are not usable, and the reason says by how much the clocks differ."""
+    """Pieces would not fit together: its joint states are not usable, and the reason gives the difference of the clocks."""
     one = robot(late)
     assert np.ptp(one.go(100)) == 0.0 and words in one.drive.unusable
 
 
 @pytest.mark.parametrize("samples", [301, 433, 517, 848])
 def test_stop_brakes_within_the_limits_and_the_reference_says_where_it_rests(samples: int) -> None:
-    """STOP, from any speed: the joint is at rest after LEAD and speed over acceleration, and the last reference is its place."""
+    """STOP, from any speed: the joint is at rest after LEAD and speed over acceleration, and the last reference is its position."""
     one = robot()
     one.go(samples)
     one.drive.obey_stop()
@@ -129,7 +129,7 @@ def test_stop_brakes_within_the_limits_and_the_reference_says_where_it_rests(sam
 
 @pytest.mark.parametrize("samples", [301, 517])
 def test_a_computer_that_dies_leaves_a_joint_that_comes_to_rest_by_itself(samples: int) -> None:
-    """No further message: after the horizon the controller brakes as it was told, within the limits."""
+    """Without further messages the controller brakes after the horizon as in its last message, within the limits."""
     one = robot()
     one.go(samples)
     one.go(150, deaf=True)
@@ -138,7 +138,7 @@ def test_a_computer_that_dies_leaves_a_joint_that_comes_to_rest_by_itself(sample
 
 
 def test_a_stall_longer_than_the_horizon_ends_it_and_a_shorter_one_is_not_noticed() -> None:
-    """After a shorter one the motion goes on where it would be; after a longer one nothing goes on by itself, and the reason is told."""
+    """After a shorter interruption the motion continues at its present point; after a longer one it stays at rest, with a reason."""
     one = robot()
     one.go(400)
     one.go(200, held_up=70)
@@ -150,7 +150,7 @@ def test_a_stall_longer_than_the_horizon_ends_it_and_a_shorter_one_is_not_notice
 
 
 def test_a_joint_that_something_holds_back_stays_where_it_is_in_the_end() -> None:
-    """The drive brakes, says that the joint does not follow, and where it was measured is what it is told to keep."""
+    """The drive brakes with the reason that the joint does not follow, and commands the measured position."""
     one = robot()
     one.go(400)
     held = one.place - 0.5
@@ -164,14 +164,14 @@ def test_a_joint_that_something_holds_back_stays_where_it_is_in_the_end() -> Non
 
 
 def test_a_joint_whose_motion_would_leave_its_travel_is_not_moved() -> None:
-    """Place, motion and travel are told; no message goes out."""
+    """The reason gives position, motion and travel; no message is sent."""
     one = robot(travel_max=0.6)
     assert one.drive.fault and "x stands at 0.4 rad: its motion from 0.1 to 0.7 rad would leave its travel" in one.drive.reason
     assert np.ptp(one.go(100)) == 0.0 and one.drive.state == "stopped"
 
 
 def test_an_axis_that_is_off_stays() -> None:
-    """It is told its place, with speed 0."""
+    """It gets its position as reference, with speed 0."""
     two = {"x": AxisExcitation(**JOINT), "y": AxisExcitation(**{**JOINT, "kind": "off", "max_speed": 0.0, "max_acceleration": 0.0})}
     drive = drive_of(settings().model_copy(update={"axes": two}))
     assert isinstance(drive, TrajectoryDrive)
@@ -197,13 +197,13 @@ def test_an_axis_that_is_off_stays() -> None:
     ],
 )
 def test_what_exceeds_the_limits_is_refused_before_anything_moves(x: dict[str, Any], words: str) -> None:
-    """The limit is named, with the largest size that it allows."""
+    """The error names the limit, with the largest allowed size."""
     with pytest.raises(BadInput, match=words):
         drive_of(settings(**x))
 
 
 def test_a_size_within_the_limits_is_kept_and_nothing_changes_while_active() -> None:
-    """rms is that of the motion; limits of a motion that is under way are not raised."""
+    """rms is that of the motion; limits are not raised during a motion."""
     one = robot(rms=0.004)
     one.go(804)
     assert np.std(one.path) == pytest.approx(0.004, rel=0.02)
@@ -214,14 +214,14 @@ def test_a_size_within_the_limits_is_kept_and_nothing_changes_while_active() -> 
 
 @pytest.mark.parametrize("more", [{"output": "blocks"}, {"interface": "velocity"}])
 def test_trajectories_are_positions_for_a_controller(more: dict[str, Any]) -> None:
-    """The command says what else has to be set."""
+    """The command names the other required settings."""
     given = {**settings().model_dump(), **more}
     with pytest.raises(BadInput, match="interface"):
         build(ExcitationSettings, given)
 
 
 def test_a_joint_state_that_comes_while_this_computer_has_stood_still_is_no_fault_of_the_clock() -> None:
-    """What lags is the count of commands, which were due and are not sent yet: states of any time since then are usable, and none of later."""
+    """If commands are late, joint states up to the present time are usable, and no later ones."""
     one = robot()
     one.go(100)
     stalled = round(0.2 * RATE)
@@ -231,5 +231,5 @@ def test_a_joint_state_that_comes_while_this_computer_has_stood_still_is_no_faul
         return one.drive.see(Block(("x",), at, at / RATE, np.array([[one.place]])), overdue)
 
     assert not seen(stalled, 0) and "stamped 0.2 s after it comes" in one.drive.unusable
-    assert seen(1, stalled) and seen(stalled, stalled)  # one that has waited to be read, and one that came just now
+    assert seen(1, stalled) and seen(stalled, stalled)  # one that has waited to be read, and one that has just arrived
     assert not seen(2 * stalled, stalled) and "stamped 0.2 s after it comes" in one.drive.unusable

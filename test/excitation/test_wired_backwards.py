@@ -1,4 +1,4 @@
-"""An axis that is wired backwards is stopped within a tenth of its travel at any voltage, and a right one never is."""
+"""An axis with reversed wiring is stopped within a tenth of its travel at any voltage, and a correct one never is."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Axis:
 
 @compiled
 def _played(voltage: FloatArray, numbers: FloatArray, place: float, speed: float) -> tuple[FloatArray, float, float]:
-    """(n,) m at the beginning of each sample, and place and speed after the last."""
+    """(n,) m at the start of each sample, and position and speed after the last."""
     gain, lag, friction, load, unstable = numbers
     places, rubs = np.empty(voltage.size), gain * friction / lag
     for row in range(voltage.size):
@@ -62,7 +62,7 @@ def _played(voltage: FloatArray, numbers: FloatArray, place: float, speed: float
 
 
 def driven(axis: Axis, excitation: AxisExcitation, seconds: float, sign: float = 1.0) -> tuple[Drive, float]:
-    """The drive after so long, and the furthest place of the axis from where it began, m."""
+    """The drive after this time, and the largest distance of the axis from its start, m."""
     drive, random = Drive(ExcitationSettings(axes={"x": excitation})), np.random.default_rng(excitation.seed)
     drive.start()
     begin, furthest = axis.place, 0.0
@@ -78,19 +78,19 @@ def driven(axis: Axis, excitation: AxisExcitation, seconds: float, sign: float =
 
 
 def promised() -> dict[float, tuple[float, float]]:
-    """Of the table in the docs: s until zero volts and m until rest, by V rms."""
+    """Bounds from the table in the docs: s until zero volts and m until rest, by V rms."""
     rows = re.findall(r"^\| ([\d.]+) V \| ([\d.]+) ms \| ([\d.]+) mm \|", DOC.read_text(encoding="utf-8"), re.MULTILINE)
     return {float(rms): (float(time) / 1000, float(way) / 1000) for rms, time, way in rows}
 
 
 def test_the_docs_give_every_level_and_each_is_within_a_tenth_of_the_travel() -> None:
-    """From 0.1 V to the limit, as ``python -m campaigns.faults.backwards`` has measured it."""
+    """From 0.1 V to the limit, as measured by ``python -m campaigns.faults.backwards``."""
     assert set(promised()) == set(LEVELS) and max(way for _, way in promised().values()) < TENTH
 
 
 @pytest.mark.parametrize("rms", LEVELS)
 def test_the_simulated_table_wired_backwards_is_stopped_as_the_docs_promise(rms: float) -> None:
-    """Default settings, signs wrong from the start, two seeds of the 25 that were measured."""
+    """Default settings, wrong signs from the start, two of the 25 measured seeds."""
     seconds, way = promised()[rms]
     stopped, longest, furthest = worst(rms, (2, 5))
     assert stopped and round(longest, 3) <= seconds and furthest <= way
@@ -103,9 +103,9 @@ def test_the_simulated_table_wired_backwards_is_stopped_as_the_docs_promise(rms:
     ids=["as it is", "slow", "late", "friction", "noisy", "coarse", "load"],
 )
 def test_an_axis_wired_backwards_is_stopped_within_a_tenth_of_its_travel(wrong: dict[str, float], rms: float) -> None:
-    """Slow, late, sticky, noisy, coarse or loaded: at any voltage less than 20 of 200 mm, with a reason that says what to do."""
+    """Slow, delayed, sticky, noisy, coarse or loaded: at any voltage less than 20 of 200 mm, with a reason and the next action."""
     drive, furthest = driven(Axis(**wrong), AxisExcitation(rms=rms, seed=3, **LONG), 20.0, sign=-1.0)
-    held = wrong.get("friction", 0.0) > rms  # then it rests, and that is no fault
+    held = wrong.get("friction", 0.0) > rms  # then it rests, which is no fault
     assert furthest < 0.02 and (drive.fault or held), (drive.state, drive.reason, furthest)
     assert not drive.fault or "wires or the encoder's sign" in drive.reason, drive.reason
 
@@ -139,14 +139,14 @@ def test_a_right_axis_is_never_called_backwards(right: str, rms: float) -> None:
 @pytest.mark.parametrize("kind", ["multisine", "sweep", "stepped_sine", "prbs", "step", "impulse", "off"])
 @pytest.mark.parametrize("delay", [0.0, 0.03])
 def test_no_kind_of_signal_makes_a_right_axis_look_backwards(kind: str, delay: float) -> None:
-    """Where a delay is half a period, plus moves it to minus: that says nothing of the wiring."""
+    """With a delay of half a period, a positive voltage moves it to minus: that is no sign of wrong wiring."""
     for rms in (0.3, 2.0):
         drive, _ = driven(Axis(delay=delay), AxisExcitation(kind=kind, rms=rms, low=0.5, **LONG), 6.0)
         assert "sign" not in drive.reason and "wires" not in drive.reason, drive.reason
 
 
 def test_an_axis_that_vibrates_under_a_weak_centring_is_not_called_backwards() -> None:
-    """Moved by its neighbour, not by its own voltage, which only follows the motion through the centring."""
+    """Moved by the other axis, not by its own voltage, which only follows the motion through the centring."""
     for frequency in (3.0, 12.0, 31.0):
         drive = Drive(ExcitationSettings(axes={"x": AxisExcitation(kind="off", **LONG)}))
         drive.start()

@@ -1,4 +1,4 @@
-"""A designed experiment as a trajectory, for a robot that takes nothing else."""
+"""A designed experiment as a trajectory, for a robot that accepts only trajectories."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FOUND = NextExperiment("x", 2000.0, "", LIMITS, SINE)
 
 
 def test_the_trajectory_is_the_motion_that_the_model_expects_from_rest_to_rest() -> None:
-    """It begins and ends at the start with no speed; between, its speed is the gain times the voltage; speed and place agree."""
+    """It begins and ends at rest at the start; in between, its speed is the gain times the voltage; speed and position agree."""
     made = as_trajectory(FOUND, MODEL, 100.0)
     assert made.time[-1] == pytest.approx(6.0, abs=0.02) and made.time[1] == pytest.approx(0.01)
     assert made.position[[0, -1]] == pytest.approx([0.05, 0.05], abs=1e-5) and made.speed[[0, -1]] == pytest.approx([0.0, 0.0], abs=1e-3)
@@ -40,7 +40,7 @@ def test_the_trajectory_is_the_motion_that_the_model_expects_from_rest_to_rest()
     ],
 )
 def test_a_motion_that_leaves_a_limit_is_refused_in_one_line(limits: MachineLimits, words: str) -> None:
-    """Nothing is scaled silently: another experiment has to be designed."""
+    """An error instead of silent scaling: another experiment must be designed."""
     tight = replace(FOUND, limits=limits)
     with pytest.raises(BadInput, match=words):
         as_trajectory(tight, MODEL, 100.0)

@@ -1,4 +1,4 @@
-"""What is believed of an effect that the data do not show."""
+"""Parameter uncertainty of an effect that the data do not show."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sysid.greybox.axis_data import prepare
 
 @pytest.mark.parametrize("slope", [0.0, np.nan, 1.0])
 def test_parameters_that_the_data_do_not_show_or_show_alike_are_no_error(slope: float) -> None:
-    """Derivatives that are all zero, no numbers, or all the same leave a model with finite parameters, and end."""
+    """Derivatives that are all zero, NaN, or all equal give a model with finite parameters."""
     random = np.random.default_rng(2)
     voltage = random.normal(size=2000)
     data = prepare(500.0, voltage, np.cumsum(voltage) * 1e-4)

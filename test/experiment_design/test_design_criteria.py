@@ -9,15 +9,15 @@ import xy_sysid.experiment_design as package
 from xy_sysid.experiment_design.criteria import TABLE
 
 ELSEWHERE = {
-    "first.py": {"POLE", "DELAY", "FRICTION", "CROSSES", "COUNTS", "WIDTH", "DRAWS", "SHORTEST"},  # the axes that may be there
-    "experiment.py": {"AGE", "KEPT"},  # how the excitation drives, and a cache
-    "limits.py": {"SECONDS"},  # a limit that nobody has given
+    "first.py": {"POLE", "DELAY", "FRICTION", "CROSSES", "COUNTS", "WIDTH", "DRAWS", "SHORTEST"},  # the possible axes
+    "experiment.py": {"AGE", "KEPT"},  # settings of the excitation, and a cache
+    "limits.py": {"SECONDS"},  # a limit that is not set
     "proposals.py": {"PART", "NEAR", "HALVES", "FINER"},  # the grid of candidates
 }
 
 
 def test_every_number_that_decides_stands_in_one_table() -> None:
-    """A constant of another module is refused, but for those of the candidates and of the axes that may be there."""
+    """Constants in other modules are not allowed, except those of the candidates and of the possible axes."""
     for path in sorted(Path(package.__file__).parent.glob("*.py")):
         if path.name == "criteria.py":
             continue
@@ -30,6 +30,6 @@ def test_every_number_that_decides_stands_in_one_table() -> None:
 
 
 def test_every_number_has_a_reason() -> None:
-    """Its name is said once; its reason is more than its name."""
+    """Its name is unique; its reason is more than its name."""
     assert len({row.name for row in TABLE}) == len(TABLE) > 20
     assert all(len(row.because) > 20 for row in TABLE)

@@ -1,4 +1,4 @@
-"""A first experiment for an axis of which nothing is known but its limits."""
+"""A first experiment for an axis with known limits only."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def found() -> NextExperiment:
 
 
 def test_it_says_how_loud_which_band_and_how_long(found: NextExperiment) -> None:
-    """Within the voltage and the travel, with margin, for every axis that may be there."""
+    """Within the voltage and the travel, with margin, for every possible axis."""
     assert isinstance(found.experiment, Experiment)
     needs = found.needs
     assert needs is not None and 0.0 < needs.voltage <= 5.0 and found.seconds >= 30.0
@@ -32,7 +32,7 @@ def test_it_says_how_loud_which_band_and_how_long(found: NextExperiment) -> None
 
 
 def test_a_table_that_nobody_described_stays_within_its_limits(found: NextExperiment) -> None:
-    """The simulated table carries it out: neither voltage nor travel is left, and the guards have nothing to do."""
+    """On the simulated table, voltage and travel stay within their limits, and no guard trips."""
     assert found.experiment is not None and found.needs is not None
     made = Machine.from_file("rigid.yaml")
     axes = dict.fromkeys(made.axes, found.experiment.excitation)
@@ -43,13 +43,13 @@ def test_a_table_that_nobody_described_stays_within_its_limits(found: NextExperi
 
 
 def test_an_axis_that_its_friction_holds_may_carry_a_load() -> None:
-    """To either side: it would drift while the experiment moves it, and stays within the travel all the same."""
+    """A load to either side: the axis drifts during the experiment, but stays within the travel."""
     loads = [dict(model.effects)["constant_load"][0] / dict(model.effects)["coulomb_friction"][0] for model in _draws(LIMITS, 1)]
     assert min(loads) < -0.3 and max(loads) > 0.3 and max(map(abs, loads)) <= 1.0
 
 
 def test_where_no_experiment_is_safe_it_says_what_to_do() -> None:
-    """A travel that the fastest axis leaves at once: no experiment, and the way to the first run."""
+    """A travel that the fastest axis leaves at once: no experiment, but a reference to the first run."""
     tight = MachineLimits(voltage=5.0, travel=(-0.14, 0.14), speed=1e-9)
     none = first_experiment("x", 500.0, tight)
     assert none.experiment is None and "run --first" in none.sentence

@@ -1,4 +1,4 @@
-"""What an experiment may ask of the machine."""
+"""Limits of an experiment."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def test_it_says_which_limit_a_motion_comes_too_near_to() -> None:
 
 
 def recorded(amplitude: float, volts: float, zero: float, samples: int = 2000) -> Run:
-    """The same as a recording whose zero lies elsewhere."""
+    """The same as a recording with another zero."""
     item = motion(amplitude, volts)
     return Recording.from_arrays(RATE, item.voltage[:samples], item.position[:samples] + zero, units=("V", "m")).run("x")
 
 
 def test_without_limits_an_experiment_stays_within_what_was_recorded() -> None:
-    """The largest voltage of all recordings; the travel of the last one, from where it ends, as the zero of another may be elsewhere."""
+    """The largest voltage of all recordings; the travel of the last one, relative to its end, because others may have another zero."""
     last = recorded(0.05, 2.0, 0.02)
     limits = as_recorded([recorded(0.08, 3.0, -0.3), last])
     assert limits.voltage == pytest.approx(3.0, rel=1e-3)
@@ -56,7 +56,7 @@ def test_without_limits_an_experiment_stays_within_what_was_recorded() -> None:
 
 
 def test_a_recording_that_ends_where_it_went_farthest_leaves_no_room_that_is_known() -> None:
-    """Nothing is added to what was recorded: refused in one line, unless somebody says how far the axis may go."""
+    """The recorded travel has no reserve: refused in one line, unless the user gives the travel."""
     ends_high = recorded(0.05, 3.0, 0.0, 251)
     with pytest.raises(BadInput, match="where the axis stands, 50 mm, between its ends"):
         as_recorded([ends_high])
@@ -64,7 +64,7 @@ def test_a_recording_that_ends_where_it_went_farthest_leaves_no_room_that_is_kno
 
 
 def test_the_zone_in_which_the_excitation_brakes_is_kept_free_where_it_is_longer_than_the_margin() -> None:
-    """30 mm before an end; what goes there would not be the experiment that was designed. From inside it nothing is designed."""
+    """The brake zone begins 30 mm before an end and would change the experiment. No experiment is designed from inside it."""
     limits = MachineLimits(voltage=2.0, travel=(-0.1, 0.1), brake=0.03)
     assert limits.broken(motion(0.075)) == "travel" and limits.broken(motion(0.069)) == ""
     assert limits.room == pytest.approx(0.07) and replace(limits, brake=0.01).room == pytest.approx(0.085)
@@ -73,7 +73,7 @@ def test_the_zone_in_which_the_excitation_brakes_is_kept_free_where_it_is_longer
 
 
 def test_the_design_fades_in_as_the_excitation_does() -> None:
-    """Its ramp is in every proposal, and in what is simulated."""
+    """Its ramp is in every proposal, and in the simulation."""
     settings = ExcitationSettings(axes={"x": AxisExcitation(brake=0.03)}, ramp=4.0)
     limits = MachineLimits(**of_settings(settings, "x"))
     assert (limits.ramp, limits.brake) == (4.0, 0.03)
@@ -114,17 +114,17 @@ def test_no_proposal_asks_for_more_than_the_voltage() -> None:
 
 
 def test_every_proposal_is_one_that_the_excitation_takes() -> None:
-    """Its settings have bounds of their own, which a large limit of the voltage or a short travel would pass."""
+    """Its settings have their own bounds, which a large voltage limit or a short travel would exceed."""
     for limits in (MachineLimits(voltage=1000.0, travel=(-0.1, 0.1)), MachineLimits(voltage=900.0, travel=(-1e-5, 1e-5))):
         assert all(item.excitation.rms <= 100.0 for item in proposals(limits, RATE))
 
 
 def test_no_proposal_pulls_harder_than_the_excitation_allows() -> None:
-    """A joint driven in long blocks: whatever is proposed, the excitation takes it, and an offset holds it inside the travel."""
+    """A joint driven in long blocks: the excitation accepts every proposal, and an offset keeps it inside the travel."""
     axis = AxisExcitation(limit=1.2, travel_min=-2.5, travel_max=2.5)
     settings = ExcitationSettings(axes={"x": axis}, rate=RATE, block=100, lockstep=True, unit="rad")
     limits = MachineLimits(voltage=1.2, travel=(-2.5, 2.5), start=0.8, centring=float(most_centring(settings)[0]))
-    assert limits.centring < 0.95 * limits.voltage / limits.room  # what would be proposed otherwise is refused
+    assert limits.centring < 0.95 * limits.voltage / limits.room  # the proposal without this is refused
     held = 0
     for item in proposals(limits, RATE):
         check_loop(settings.model_copy(update={"axes": {"x": item.excitation}}))
@@ -135,7 +135,7 @@ def test_no_proposal_pulls_harder_than_the_excitation_allows() -> None:
 
 
 def test_what_drifts_slowly_to_a_limit_is_seen_in_an_experiment_that_lasts() -> None:
-    """A load against a weak centring: 86 mm after 8 s, 177 mm after a minute."""
+    """A load with weak centring: 86 mm after 8 s, 177 mm after a minute."""
     limits = MachineLimits(voltage=5.0, travel=(-0.14, 0.14))
     hangs = AxisModel(0.097, 1e-3, 246.0).with_effect("constant_load", (0.15,))
     held = AxisExcitation(kind="off", rms=0.0, centring=0.84, limit=5.0)

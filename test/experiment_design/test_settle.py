@@ -1,4 +1,4 @@
-"""From one short recording that does not tell to the experiments that do, on the simulated machine."""
+"""From a short, ambiguous recording to the experiments that settle it, on the simulated machine."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def data(short: Signals) -> AxisData:
 
 
 def test_what_one_recording_leaves_open_is_settled_by_an_experiment_within_the_limits(short: Signals) -> None:
-    """The recording names the wrong set, and says that two are possible; after the experiment the right one is left. Replayed, it is the same."""
+    """The recording gives the wrong set, with two possible; after the experiment only the right one remains. A replay gives the same."""
     made = machine(LAG, 1, 1)
     asked: list[Experiment] = []
 
@@ -68,14 +68,14 @@ def test_what_one_recording_leaves_open_is_settled_by_an_experiment_within_the_l
 
 
 def test_it_ends_when_somebody_stops_it(short: Signals) -> None:
-    """STOP is an ordinary end: nothing is claimed."""
+    """STOP is a normal end, without a result."""
     found = settle(Question(2000.0, [short], LAG.sets, STANDARD), limits(LAG), lambda experiment: None, FEW, lambda *_: NextChoice(LOUD))
     assert found.ended == "stopped"
     assert found.seconds == 0.0
 
 
 def test_sets_with_the_same_equations_are_told_by_no_experiment(data: AxisData) -> None:
-    """What predicts the same motion has no evidence against it, however loud the experiment."""
+    """A set that predicts the same motion has no evidence against it, for any strength of the experiment."""
     fits = standing(data, STANDARD, [("constant_load",)]).fits
     evidence = Evidence(data)
     own, other = (believed(evidence, fits[0], 1, seed) for seed in (0, 1))
@@ -84,7 +84,7 @@ def test_sets_with_the_same_equations_are_told_by_no_experiment(data: AxisData) 
 
 
 def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
-    """Evidence of zero never tells; ten times the odds do; the seconds needed are those at which 95 % is reached."""
+    """Zero evidence never settles; ten times the odds do; the needed seconds are those at which 95 % is reached."""
     one = Power(truth=0, rival=1, rate=1.0, price=0.0)
     assert Power(0, 1, 0.0, 0.0).probability(60.0) == 0.0
     assert one.probability(30.0 * ODDS) > 0.999
@@ -94,7 +94,7 @@ def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
 
 
 def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:
-    """What is said is of the seconds that it really lasts."""
+    """The stated probability is that of its actual length."""
     one = Power(truth=0, rival=1, rate=1.0, price=0.0)
     needed = seconds_needed([[one]], 1000.0)
     best = Judged(Experiment(AxisExcitation(kind="noise"), 60.0), seconds=needed, probability=1.0, each=((one,),))
@@ -111,7 +111,7 @@ def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:
 
 
 def test_an_experiment_that_ends_early_promises_what_its_own_seconds_bring() -> None:
-    """Where none is sure, it ends once more of it would be a waste; the promise is that of its end, not of all the seconds that there were."""
+    """If no experiment settles, it ends when more time gains little; the stated probability is that at its end, not for all seconds."""
     one = Power(truth=0, rival=1, rate=0.01, price=3.0)
     whole = 400.0
     item = Judged(Experiment(AxisExcitation(kind="noise")), probability=settled([[one]], whole - RAMP), each=((one,),))
@@ -121,31 +121,31 @@ def test_an_experiment_that_ends_early_promises_what_its_own_seconds_bring() -> 
 
 
 def test_a_set_with_one_law_twice_is_refused(data: AxisData) -> None:
-    """Coulomb friction is a part of friction that differs between the directions."""
+    """Coulomb friction is a special case of asymmetric friction."""
     with pytest.raises(BadInput, match="each law once"):
         standing(data, STANDARD, [("coulomb_friction", "asymmetric_friction")])
 
 
 def test_no_set_that_may_be_true_has_a_law_twice(data: AxisData) -> None:
-    """A load beside friction looks like friction that differs between the directions, which takes the place of both."""
+    """A load with Coulomb friction equals asymmetric friction, which replaces both."""
     sets = possible(data, STANDARD, Answer(rungs=(), best=("constant_load", "coulomb_friction")))
     assert len(sets) > 1 and not any(is_twice(STANDARD, each) for each in sets)
 
 
 def test_where_backlash_is_named_nothing_is_settled_among_what_looks_like_it(data: AxisData) -> None:
-    """It would be left out of the sets, and one of the others be called settled."""
+    """Otherwise it would be left out of the sets, and another one called settled."""
     with pytest.raises(BadInput, match=r"effect that is named is backlash; allowed: effects that free simulation can predict.*Its own experiment"):
         possible(data, STANDARD, Answer(rungs=(), best=("backlash",)))
 
 
 def test_look_alikes_stand_where_what_they_look_like_stands(data: AxisData) -> None:
-    """Sets keep the order of what was named, and none is there twice in another order."""
+    """Sets keep the order of the named effects, and none is repeated in another order."""
     sets = possible(data, STANDARD, Answer(rungs=(), best=("saturation", "cogging")))
     assert ("saturation", "lead_error") in sets and len({frozenset(each) for each in sets}) == len(sets)
 
 
 def test_sets_with_the_same_equations_are_not_settled_by_their_names() -> None:
-    """A base and a screw that give: what is chosen is one of two that no data distinguish, so both are left, and nothing is called settled."""
+    """A flexible base and a flexible screw: no data distinguish the two, so both remain, and nothing is called settled."""
     one = recorded_machine("base_resonance", seconds=8.0)
     run = one.run("x")
     data = prepare_all(run.sampling_rate, [(run.voltage, run.position)])
@@ -157,7 +157,7 @@ def test_sets_with_the_same_equations_are_not_settled_by_their_names() -> None:
 
 
 def test_an_effect_that_no_simulation_follows_is_refused(data: AxisData) -> None:
-    """Backlash is judged one sample ahead: one line says so."""
+    """Backlash needs one-step prediction: an error of one line says so."""
     with pytest.raises(BadInput, match="backlash"):
         standing(data, STANDARD, [(), ("backlash",)])
 

@@ -1,4 +1,4 @@
-"""The way to a settled diagnosis, from recordings in bags, and again from the same bags."""
+"""The steps to a settled diagnosis, from recordings in bags, and again from the same bags."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ LOUD = Experiment(AxisExcitation(kind="noise", rms=1.0), 8.0)
 
 
 def decision(left: tuple[tuple[str, ...], ...], then: Experiment | None) -> Decision:
-    """As if these sets were left of three."""
+    """A decision with these sets remaining of three."""
     every = (("coulomb_friction",), ("stribeck_friction",), ("dead_zone",))
     return Decision(Standing(names=every, fits=(), chosen=0, doubt=0.0), left, NextChoice(then))
 
 
 def test_a_walk_settles_and_its_bags_decide_the_same_again(tmp_path: Path) -> None:
-    """Two steps on the simulated machine: the wrong set first, then the right one alone. Replayed from the bags, each step is the same."""
+    """Two steps on the simulated machine: first the wrong set, then only the right one. A replay from the bags gives the same steps."""
     made, plan = machine(LAG, 1, 1), WalkPlan("x", limits(LAG), Budget(experiments=2, seconds=30.0, draws=1), LAG.sets)
     signals, before, done, runs = first_recording(LAG, made, 1), None, [], []
     for number in range(2):
@@ -54,13 +54,13 @@ def test_a_walk_settles_and_its_bags_decide_the_same_again(tmp_path: Path) -> No
 
 
 def test_a_plan_is_read_as_it_was_written() -> None:
-    """Limits, budget and sets; what has no limit stays without one."""
+    """Limits, budget and sets; missing limits stay missing."""
     plan = WalkPlan("x", limits(LAG), Budget(experiments=3), LAG.sets)
     assert plan_of(json.loads(json.dumps(plan_document(plan))), STANDARD) == plan
 
 
 def test_a_folder_that_is_no_walk_is_refused(tmp_path: Path) -> None:
-    """One line that says what to give."""
+    """One line with the required input."""
     with pytest.raises(BadInput, match="walk"):
         replayed(tmp_path)
 
@@ -78,7 +78,7 @@ def test_a_folder_that_is_no_walk_is_refused(tmp_path: Path) -> None:
     ],
 )
 def test_a_walk_that_was_edited_by_hand_is_refused_in_one_line(tmp_path: Path, text: str | tuple[str, Any], words: str) -> None:
-    """It names the key, whatever stands there."""
+    """The error names the key, for any value."""
     plan = plan_document(WalkPlan("x", limits(LAG), Budget(), LAG.sets))
     whole = text if isinstance(text, str) else json.dumps({"plan": {**plan, text[0]: text[1]}, "steps": []})
     (tmp_path / "walk.json").write_text(whole)
@@ -88,7 +88,7 @@ def test_a_walk_that_was_edited_by_hand_is_refused_in_one_line(tmp_path: Path, t
 
 
 def test_nothing_follows_what_is_settled_or_a_budget_that_is_spent() -> None:
-    """One set left, no experiment that helps, as many experiments as allowed, no seconds: each has its name."""
+    """One set left, no helpful experiment, the largest number of experiments, no seconds: each ending has its name."""
     budget, two = Budget(experiments=2, seconds=20.0), (("coulomb_friction",), ("stribeck_friction",))
     assert after(decision(two[:1], None), budget, 0, 0.0) == "settled"
     assert after(decision(two, None), budget, 0, 0.0) == "impossible"
@@ -100,7 +100,7 @@ def test_nothing_follows_what_is_settled_or_a_budget_that_is_spent() -> None:
 
 
 def test_the_end_is_told_in_a_sentence() -> None:
-    """What is settled and what was ruled out; what is still possible otherwise."""
+    """The settled and the excluded sets; otherwise the sets that are still possible."""
     assert told(decision((("coulomb_friction",),), None), "settled") == (
         "Settled: coulomb_friction. The recordings rule out stribeck_friction, dead_zone."
     )
@@ -111,7 +111,7 @@ def test_the_end_is_told_in_a_sentence() -> None:
 
 
 def test_a_gain_that_one_recording_alone_shows_is_no_less_sure() -> None:
-    """Windows without evidence in the first recording do not make the clear windows of an experiment doubtful, as pooling all would."""
+    """Windows without evidence in the first recording do not weaken the clear windows of an experiment, as pooling would."""
 
     begins = np.array([0, 25, 50, 75, 100, 125, 150, 175])
     one: Any = SimpleNamespace(scores=np.zeros(8))

@@ -1,4 +1,4 @@
-"""Whatever a user's effect file does wrong is one line that names the file and the line."""
+"""Any error in a user's effect file gives one line with the file and the line number."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LOADED = {
 
 @pytest.mark.parametrize("name", LOADED)
 def test_an_error_while_the_file_is_loaded(name: str, tmp_path: Path) -> None:
-    """Exit code 2, one line, the file, the line in it, and what Python says."""
+    """Exit code 2, one line, the file, the line in it, and Python's message."""
     text, line, words = LOADED[name]
     file = tmp_path / "own.py"
     file.write_text(text)
@@ -36,7 +36,7 @@ def test_an_error_while_the_file_is_loaded(name: str, tmp_path: Path) -> None:
 
 
 def test_an_error_that_has_no_line(tmp_path: Path) -> None:
-    """A file that is no text: the file at least is named."""
+    """A binary file: the error names at least the file."""
     for content in (b"a = 1\0\n", b"\xff\xfe\x00"):
         file = tmp_path / "own.py"
         file.write_bytes(content)
@@ -54,7 +54,7 @@ USED = {
 
 @pytest.mark.parametrize("name", USED)
 def test_an_error_while_its_functions_are_used(name: str, tmp_path: Path) -> None:
-    """In the middle of a search, too; also where the law cannot be compiled."""
+    """Also during a search, and if the law cannot be compiled."""
     before, after, line, words = USED[name]
     file = tmp_path / "own.py"
     assert before in GOOD
@@ -77,7 +77,7 @@ WRONG = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_what_its_functions_give_wrong_is_named(name: str, tmp_path: Path) -> None:
-    """Columns and values that do not fit, and laws that cannot be computed: one line with what was given and what is needed."""
+    """Wrong columns and values, and laws that cannot be computed: one line with the given and the required input."""
     before, after, words = WRONG[name]
     file = tmp_path / "own.py"
     assert before in GOOD

@@ -1,4 +1,4 @@
-"""A model for other tools means the same there: YAML that reloads, .mat for tf(), python-control with the same response."""
+"""Exports to other tools are equivalent: YAML that reloads, .mat for tf(), python-control with the same response."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def fit() -> Fit:
 
 
 def test_a_model_file_gives_back_the_same_numbers(fit: Fit, tmp_path: Path) -> None:
-    """Every bit of every coefficient, the hold, the units, and whose data it saw; y is quoted."""
+    """Every bit of every coefficient, the hold, the units, and the hash of its data; y is quoted."""
     path = tmp_path / "m.yaml"
     linear_models.write_model(path, {"x": fit, "y": fit}, {"source": "rec", "data_sha256": {"y": "abc"}})
     assert '"y":' in path.read_text() and "\n  y:" not in path.read_text()
@@ -44,7 +44,7 @@ def test_a_model_file_gives_back_the_same_numbers(fit: Fit, tmp_path: Path) -> N
 
 
 def test_a_discrete_model_keeps_its_sampling_time(fit: Fit, tmp_path: Path) -> None:
-    """And says that it is a function of z."""
+    """A discrete function is marked as a function of z."""
     z = replace(fit, tf=discrete(fit.tf, RATE))
     linear_models.write_model(tmp_path / "m.yaml", {"x": z}, {})
     back = linear_models.read_saved(tmp_path / "m.yaml")["x"].tf
@@ -55,14 +55,14 @@ def test_a_discrete_model_keeps_its_sampling_time(fit: Fit, tmp_path: Path) -> N
 def test_a_hold_that_nobody_knows_is_refused(fit: Fit, tmp_path: Path) -> None:
     """Only zoh and none."""
     linear_models.write_model(tmp_path / "m.yaml", {"x": fit}, {})
-    told = (tmp_path / "m.yaml").read_text().partition("\n")[2]  # without the sum: changed on purpose
+    told = (tmp_path / "m.yaml").read_text().partition("\n")[2]  # without the checksum: changed on purpose
     (tmp_path / "m.yaml").write_text(told.replace("hold: zoh", "hold: foh"))
     with pytest.raises(BadInput, match="hold is 'foh'; allowed: zoh, none"):
         linear_models.read_saved(tmp_path / "m.yaml")
 
 
 def test_a_mat_file_is_ready_for_tf(fit: Fit, tmp_path: Path) -> None:
-    """tf(x_num, x_den, 'InputDelay', x_delay): rows of falling powers; names that MATLAB takes; the measured lines beside it."""
+    """tf(x_num, x_den, 'InputDelay', x_delay): rows of falling powers; names valid in MATLAB; with the measured lines."""
     linear_models.write_mat(tmp_path / "m.mat", {"x": fit, "elbow joint": fit, "2": replace(fit, tf=discrete(fit.tf, RATE))})
     content = loadmat(str(tmp_path / "m.mat"))
     for name in ("x", "elbow_joint"):
@@ -76,13 +76,13 @@ def test_a_mat_file_is_ready_for_tf(fit: Fit, tmp_path: Path) -> None:
 
 
 def control_response(system: Any, frequency: Any) -> Any:
-    """What python-control computes."""
+    """The response by python-control."""
     omega = 2 * np.pi * frequency
     return system(np.exp(1j * omega * system.dt)) if system.dt else system(1j * omega)
 
 
 def test_python_control_computes_the_same_response() -> None:
-    """Without delay exactly; with it as well as its Pade form can; in z with whole samples exactly."""
+    """Exact without delay; with a delay as accurate as its Pade form; exact in z with integer samples."""
     pytest.importorskip("control")
     plain, late = paper_machine(0.0), paper_machine()
     np.testing.assert_allclose(control_response(to_control(plain), LINES), plain.response(LINES), rtol=1e-9)
@@ -107,7 +107,7 @@ def test_python_control_simulates_the_same_step() -> None:
 
 
 def test_without_python_control_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The name of the extra is in it."""
+    """The error names the extra to install."""
     monkeypatch.setitem(__import__("sys").modules, "control", None)
     with pytest.raises(MissingExtra, match=r"xy_sysid\[control\]"):
         to_control(paper_machine())

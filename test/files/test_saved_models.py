@@ -1,4 +1,4 @@
-"""An axis model with its effects comes back from its file, is compared, validated, paired and exported; by the commands too."""
+"""An axis model with effects is loaded from its file, compared, validated, paired and exported, also by the commands."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def answer(capsys: pytest.CaptureFixture[str], *words: object) -> Any:
 
 
 def test_an_axis_model_reloads_bit_for_bit(fitted: GreyboxFit, tmp_path: Path) -> None:
-    """Every parameter, the order of effects, and whose data it saw."""
+    """Every parameter, the order of effects, and the hash of its data."""
     write_axis_models(tmp_path / "m.yaml", {"y": fitted}, {"data_sha256": {"y": "abc"}})
     back = read_models(tmp_path / "m.yaml", STANDARD)["y"]
     assert isinstance(back, PhysicalModel) and back.model == fitted.model and back.data == ("abc",)
@@ -59,7 +59,7 @@ def test_an_axis_model_reloads_bit_for_bit(fitted: GreyboxFit, tmp_path: Path) -
 
 
 def test_the_linear_part_goes_to_matlab_and_python_control(fitted: GreyboxFit, tmp_path: Path) -> None:
-    """Same response; parameters beside it."""
+    """Same response, with the parameters."""
     write_axis_mat(tmp_path / "m.mat", {"x": fitted})
     told = loadmat(tmp_path / "m.mat", squeeze_me=True)
     s = 2j * np.pi * 30.0
@@ -92,7 +92,7 @@ def test_a_damaged_file_is_refused_in_one_line(fitted: GreyboxFit, tmp_path: Pat
 
 
 def test_compare_and_validate_take_axis_models(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The right one stands at the floor on a recording it has not seen, the wrong one does not."""
+    """The right one is at the floor on a held-out recording, the wrong one is not."""
     right = answer(capsys, "compare", folder / "other.npz", folder / "right.yaml", "-a", "x")["axes"]["x"]
     wrong = answer(capsys, "compare", folder / "other.npz", folder / "wrong.yaml", "-a", "x")["axes"]["x"]
     assert right["where"] == [] and right["error"]["now"] < 1.5 * right["error"]["noise_floor"]
@@ -106,7 +106,7 @@ def test_compare_and_validate_take_axis_models(folder: Path, capsys: pytest.Capt
 
 
 def test_before_and_after_are_compared_in_pairs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A linear model and an axis model; on the recording of the fit only its last third counts."""
+    """A linear and an axis model; on the recording of the fit only the last third counts."""
     found = answer(capsys, "compare", folder / "other.npz", "--before", folder / "linear.yaml", "--after", folder / "right.yaml", "-a", "x")["axes"][
         "x"
     ]

@@ -1,4 +1,4 @@
-"""Layouts for PlotJuggler and Foxglove: every topic and field that they name is one that we publish."""
+"""Layouts for PlotJuggler and Foxglove: they name only topics and fields that we publish."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from xy_sysid.settings import ExcitationSettings, IdentifierSettings
 
 @cache
 def heard() -> Update:
-    """What the identifier says of the paper's machine."""
+    """Messages of the identifier for the paper's machine."""
     return last(replay(blocks(recorded("paper.yaml", 20.0)), IdentifierSettings(), ("x", "y")))
 
 
 @cache
 def series() -> frozenset[str]:
-    """All names under which PlotJuggler would list what we publish: /topic/data[k] and /topic/hardware_id/status/key."""
+    """All names of our published fields in PlotJuggler: /topic/data[k] and /topic/hardware_id/status/key."""
     sample = Block(("x", "y"), np.arange(20.0), np.arange(20.0), np.zeros((20, 2)))
     names = {f"/xy/{topic}/data[{k}]" for topic in ("voltage", "position") for k in range(pack(sample).size)}
     names |= {f"/xy/metrics/identifier/{status.name}/{key}" for status in heard().statuses() for key, _ in status.values}
@@ -57,7 +57,7 @@ def test_every_curve_of_plotjuggler_is_a_series_that_we_publish() -> None:
 
 
 def test_plotjuggler_keeps_the_blocks_and_knows_the_topics() -> None:
-    """A default block has fewer numbers than the layout keeps, and each topic of a curve is among those that are selected."""
+    """A default block has fewer numbers than the layout keeps, and each topic of a curve is selected."""
     root = ET.fromstring(plotjuggler())
     assert ExcitationSettings().block * len(columns(("x", "y")).split(",")) <= LARGEST_BLOCK
     for plugin in root.iter("plugin"):
@@ -67,7 +67,7 @@ def test_plotjuggler_keeps_the_blocks_and_knows_the_topics() -> None:
 
 
 def test_the_values_of_diagnostics_read_as_numbers() -> None:
-    """What is drawn over time must be a number in its text."""
+    """Texts that are drawn over time must be numbers."""
     wanted = {str(curve.get("name")).rpartition("/axis x/")[2] for curve in ET.fromstring(plotjuggler()).iter("curve")}
     statuses: list[StatusMessage] = [*heard().statuses(), diagnosis_status(told())]
     read = {key: float(value) for status in statuses for key, value in status.values if key in wanted}
@@ -111,7 +111,7 @@ def test_every_path_of_foxglove_leads_to_a_field(path: str) -> None:
 
 
 def test_the_scripts_of_foxglove_read_the_columns_that_we_send() -> None:
-    """As many columns, in this order, as the messages have; their input is a topic of ours."""
+    """The columns of the messages, in their order; the inputs are our topics."""
     fit = heard().axes["x"].fit
     assert fit is not None
     sent = {"comparison/x": comparison_message("x", fit), "error_ladder/x": ladder_message(told())}

@@ -1,4 +1,4 @@
-"""Speed and acceleration as they were measured: response, fit, comparison and diagnosis in that quantity and unit."""
+"""Measured speed and acceleration: response, fit, comparison and diagnosis in that quantity and unit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from xy_sysid.samples.recording import Recording
 from xy_sysid.units import Sensed
 
 RATE, FINE, SECONDS = 1000.0, 10, 40.0
-GAIN, POLE, FREQUENCY, DAMPING, SPLIT = 0.4, 30.0, 60.0, 0.01, 0.6  # of a motor with a load on a spring, behind a held torque
+GAIN, POLE, FREQUENCY, DAMPING, SPLIT = 0.4, 30.0, 60.0, 0.01, 0.6  # a motor with a load on a spring, behind a held torque
 
 
 def machine(kind: Sensed, friction: float = 0.0, noise: float = 1e-3) -> tuple[Recording, FloatArray]:
@@ -44,7 +44,7 @@ def machine(kind: Sensed, friction: float = 0.0, noise: float = 1e-3) -> tuple[R
 
 @pytest.mark.parametrize(("kind", "unit"), [("velocity", "rad/s"), ("acceleration", "rad/s^2")])
 def test_response_and_fit_are_of_what_was_measured(kind: Sensed, unit: str) -> None:
-    """Mobility or accelerance with its unit; resonance, antiresonance and velocity gain within their intervals, nothing misses."""
+    """Mobility or accelerance with its unit; resonance, antiresonance and velocity gain within their intervals, no effect missing."""
     recording, _ = machine(kind)
     response = xy.frf(recording, band_low=1.0, band_high=120.0)
     assert response.output_unit == unit and recording.output_unit == "rad"
@@ -65,14 +65,14 @@ def test_an_error_of_an_acceleration_is_told_in_its_unit() -> None:
     compared = xy.compare(run, model)
     assert compared.unit == "rad/s^2"
     own = 0.02 * float(np.std(run.sensed[1]))
-    assert compared.noise_floor == pytest.approx(own * np.sqrt(0.7), rel=0.2)  # of the band that is judged
+    assert compared.noise_floor == pytest.approx(own * np.sqrt(0.7), rel=0.2)  # of the judged band
     assert compared.error < 2.0 * compared.noise_floor
     found = xy.diagnose(run)
     assert "rad/s^2" in found.sentence and found.units.judged == "rad/s^2"
 
 
 def test_the_noise_of_a_tachometer_is_white_in_speed() -> None:
-    """The floor of a measured speed is its sensor's noise at every frequency, so a rigid axis with that noise misses nothing."""
+    """The floor of a measured speed is its sensor's noise at every frequency, so a rigid axis with that noise has no missing effect."""
     rng = np.random.default_rng(3)
     u = rng.normal(0.0, 2.0, 30_000)
     keep = np.exp(-POLE / RATE)

@@ -1,4 +1,4 @@
-"""The orders of a fit come from the data when nobody asks for any."""
+"""By default the orders of a fit are chosen from the data."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def two_resonances() -> TransferFunction:
     ids=["rigid", "integrator", "one resonance", "two resonances"],
 )
 def test_simulated_machines_get_their_own_orders(machine: TransferFunction, wanted: tuple[int, int]) -> None:
-    """From an integrator with delay up to two resonances, with a verdict that says why, and no other orders tried again."""
+    """From an integrator with delay up to two resonances, with a verdict that gives the reason; no orders are tested twice."""
     seen = held(machine, 0.01, seed=3)
     found = choose(seen, Structure())
     assert orders(found) == wanted
@@ -49,7 +49,7 @@ def test_simulated_machines_get_their_own_orders(machine: TransferFunction, want
 
 
 def test_misfit_that_no_pole_explains_buys_no_orders() -> None:
-    """A response that bends as friction does, ten times above its noise: the resonance is told, the cost never reaches that of noise."""
+    """A response distorted by friction, ten times above its noise: the resonance is found, but the cost never reaches that of noise."""
     bent = held_response(paper_machine(), LINES, 2000.0) * (1.0 + 0.1 / (1.0 + (LINES / 3.0) ** 2) + 0.02 * np.sin(LINES / 40.0))
     found = choose(response_of(bent, 0.002, seed=4), Structure())
     assert orders(found) == (2, 4)
@@ -84,7 +84,7 @@ def test_few_lines_buy_few_orders() -> None:
     ],
 )
 def test_real_machines_get_no_more_than_they_show(path: str, hold: str, wanted: tuple[int, int], frequency: float | None) -> None:
-    """One resonance of the bench and of the guide, none of the others, though no cost comes near that of noise."""
+    """One resonance for the bench and for the guide, none for the others, though no cost comes near that of noise."""
     model = xy.fit(xy.frf(xy.load(data(path)), hold=hold), hold=hold)
     assert model.fit is not None
     assert (model.fit.structure.numerator_order, model.fit.structure.denominator_order) == wanted
@@ -93,7 +93,7 @@ def test_real_machines_get_no_more_than_they_show(path: str, hold: str, wanted: 
 
 
 def test_orders_that_no_fit_takes_are_not_tried() -> None:
-    """From eight zeros and ten poles, four more of each are more than a fit has: nobody chose them, and nobody is told to lower them."""
+    """From eight zeros and ten poles, four more of each exceed the limits of a fit: they are not tested, and no hint suggests lower orders."""
     frf = held(two_resonances(), 0.01, seed=3)
     richest = identify(frf, Structure(numerator_order=8, denominator_order=10))
     assert all(step.fit.structure.free_order <= MOST_POLES for step in choose_orders._steps(frf, richest))

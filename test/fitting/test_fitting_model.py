@@ -1,4 +1,4 @@
-"""What a transfer function is expected to show on the lines: hold, delay, window, and the slope of it all."""
+"""The expected response of a transfer function at the lines: hold, delay, window, and its derivatives."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ def by_exponential(tf: TransferFunction, frequency: FloatArray) -> ComplexArray:
     ids=["paper", "double integrator", "direct feedthrough", "fast pole"],
 )
 def test_the_held_response_is_that_of_the_matrix_exponential(base: TransferFunction, delay: float) -> None:
-    """With any part of a sample of delay, up to the Nyquist frequency."""
+    """With any fractional delay, up to the Nyquist frequency."""
     frequency = np.array([0.1, 3.0, 47.0, 111.0, 300.0, 700.0, 990.0])
     tf = replace(base, delay=delay)
     if tf.numerator.size == tf.denominator.size and 0 < (delay * RATE) % 1 < 1:
-        frequency = frequency[:5]  # a jump that falls between samples has aliases that fade as 1 / k only
+        frequency = frequency[:5]  # a jump between samples has aliases that fall only as 1 / k
     truth = by_exponential(tf, frequency)
     assert np.max(np.abs(held_response(tf, frequency, RATE) / truth - 1.0)) < 1e-7
 
@@ -71,7 +71,7 @@ def test_the_held_response_is_that_of_the_matrix_exponential(base: TransferFunct
 @pytest.mark.parametrize("pole", [1e3, 1e5, 1e7])
 @pytest.mark.parametrize("delay", [0.0, 0.4e-3, 1.29e-3])
 def test_the_held_response_is_exact_for_poles_of_any_speed(pole: float, delay: float) -> None:
-    """A lag behind a hold: y goes to u as 1 - exp(-pole t), written down by hand."""
+    """A lag behind a hold: y approaches u as 1 - exp(-pole t), derived by hand."""
     frequency = np.array([0.1, 47.0, 300.0, 990.0])
     z = np.exp(2j * np.pi * frequency / RATE)
     whole, part = divmod(delay * RATE, 1.0)
@@ -99,7 +99,7 @@ def windowed(frf: FrequencyResponse) -> FrequencyResponse:
 
 
 def around(task: Problem, random: np.random.Generator) -> Point:
-    """A point that fits badly, so that no derivative is small by luck."""
+    """A point with a bad fit, so that no derivative is small by chance."""
     structure = task.structure
     if structure.domain == "z":
         roots = np.concatenate((np.ones(structure.integrators), 0.4 + 0.3 * random.random(structure.free_order)))

@@ -1,4 +1,4 @@
-"""The paper's own path, for comparison: literally nllsfdi, and as bad as the paper says when a delay is absorbed."""
+"""The paper's method, for comparison: exactly nllsfdi, and with the paper's large error if a delay is absorbed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from xy_sysid.samples.block import FloatArray
 
 
 def literal(response: ComplexArray, frequency: FloatArray, n: int, m: int, gauss_newton: bool) -> tuple[FloatArray, FloatArray, float, int]:
-    """(numerator, denominator in rad/s, cost, iterations): written from the description of the routine, in another way."""
+    """(numerator, denominator in rad/s, cost, iterations): an independent implementation from the description of the routine."""
     axis = 2j * np.pi * frequency
     unit = float(np.median(np.abs(axis)))
     s, weight = axis / unit, 1.0 / np.abs(response)
@@ -61,7 +61,7 @@ def literal(response: ComplexArray, frequency: FloatArray, n: int, m: int, gauss
 
 @pytest.mark.parametrize("method", ["levenberg_marquardt", "gauss_newton"])
 def test_the_papers_path_is_nllsfdi_step_by_step(method: Literal["levenberg_marquardt", "gauss_newton"]) -> None:
-    """n = 4, numerator 2..0, 100 iterations, 1e-10: the same coefficients, cost and number of steps as a second writing of it."""
+    """n = 4, numerator 2..0, 100 iterations, 1e-10: the same coefficients, cost and number of steps as the independent implementation."""
     random = np.random.default_rng(2)
     exact = held(paper_machine(), lines()[20:])
     noisy = exact.response * (1 + 0.01 * (random.standard_normal(593) + 1j * random.standard_normal(593)))
@@ -90,7 +90,7 @@ def test_the_papers_path_says_what_it_cannot_do() -> None:
 
 
 def test_an_unstable_model_is_called_so() -> None:
-    """Read literally, negative coefficients of a denominator are poles on the right."""
+    """Negative coefficients of a denominator mean poles in the right half plane."""
     true = TransferFunction(np.array([1e5]), np.array([1.0, -50.0, 1e5]))
     fit = nllsfdi.fit(measured(lines(), true.response(lines())), Structure(0, 2, 0))
     assert not fit.tf.is_stable

@@ -1,4 +1,4 @@
-"""Every estimator finds the machine again when there is no noise."""
+"""Every estimator recovers the machine without noise."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def worst(fit: Fit) -> float:
 
 
 def away(found: TransferFunction, true: TransferFunction) -> float:
-    """Largest relative error of a pole that is no integrator."""
+    """Largest relative error of a pole that is not an integrator."""
     a, b = (np.sort_complex(np.array([p for p in tf.poles() if p not in (0.0, 1.0)])) for tf in (found, true))
     return float(np.max(np.abs(a - b) / np.abs(b)))
 
@@ -59,7 +59,7 @@ def test_a_continuous_machine_is_found_again(name: str, options: FitOptions, cas
 @pytest.mark.parametrize("case", DISCRETE)
 @pytest.mark.parametrize(("name", "options"), [("lls", FitOptions()), *METHODS], ids=lambda value: value if isinstance(value, str) else value.method)
 def test_a_discrete_machine_is_found_again(name: str, options: FitOptions, case: str) -> None:
-    """In z the delay is a whole number of samples, and every estimator is exact, LLS too."""
+    """In z the delay is an integer number of samples, and every estimator is exact, including LLS."""
     true, structure = DISCRETE[case]
     frequency = lines(1800)
     fit = ESTIMATORS[name](measured(frequency, true.response(frequency)), structure, options=options)
@@ -82,7 +82,7 @@ def test_the_papers_path_finds_what_has_no_delay(method: Literal["levenberg_marq
 
 @pytest.mark.parametrize("case", CONTINUOUS)
 def test_linear_least_squares_is_exact_between_band_limited_signals(case: str) -> None:
-    """Levy's equations know no hold; given the delay they are exact."""
+    """Levy's equations have no hold; with a given delay they are exact."""
     true, structure = CONTINUOUS[case]
     fit = ESTIMATORS["lls"](measured(lines(), true.response(lines())), replace(structure, delay=true.delay, hold="none", weighting="relative"))
     assert worst(fit) < 1e-6
@@ -124,7 +124,7 @@ def test_order_twelve_is_recovered() -> None:
 
 
 def test_a_warm_start_ends_where_a_cold_one_does() -> None:
-    """The last model of a machine that has changed a little: the same minimum, in fewer steps."""
+    """From the last model of a slightly changed machine: the same minimum, in fewer steps."""
     old, new = paper_machine(1.25e-3), held(paper_machine())
     warm, cold = identify(new, Structure(), old), identify(new, Structure())
     assert warm.start == "the last model"
@@ -136,7 +136,7 @@ def test_a_warm_start_ends_where_a_cold_one_does() -> None:
 @pytest.mark.parametrize("delay", [0.0, 0.4e-3, 1.29e-3])
 @pytest.mark.parametrize("noise", [1e-4, 1e-2, 5e-2])
 def test_a_fast_pole_is_not_left_on_the_wrong_side(integrators: int, delay: float, noise: float) -> None:
-    """A fast pole and one mirrored to the right half plane with a longer delay look alike: a cold start ends at the better one."""
+    """A fast pole and one mirrored to the right half plane with a longer delay look similar: a cold start ends at the better one."""
     true = function([3e6], np.polymul(np.poly([-1000.0, -3000.0]), [1.0, *[0.0] * integrators]), delay)
     frf, structure = noisy(true, noise), Structure(0, 2 + integrators, integrators)
     cold, warm = identify(frf, structure), identify(frf, structure, true, doubt=False)

@@ -1,4 +1,4 @@
-"""What a fit says of itself: how sure it is, what went wrong, and what was asked wrongly."""
+"""The report of a fit: its uncertainty, failures, and invalid calls."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_neighbouring_lines_that_err_together_widen_the_intervals() -> None:
 
 
 def test_the_cost_tells_a_model_that_misses_something() -> None:
-    """A rigid model on a machine that swings: the cost is far above what noise explains, and a warning says so."""
+    """A rigid model on a machine with a resonance: the cost is far above that of noise, and a warning says so."""
     fit = identify(held(paper_machine(), sigma=1e-3), Structure(0, 2, 1))
     assert fit.converged
     assert fit.consistent is False
@@ -75,7 +75,7 @@ def test_the_cost_tells_a_model_that_misses_something() -> None:
 
 
 def test_the_poles_alone_are_those_of_the_whole_fit() -> None:
-    """The short way for the watch on a resonance gives the same numbers as a fit from the same start."""
+    """The fast path for the watch on a resonance gives the same numbers as a fit from the same start."""
     frf, start = noisy(3), replace(SIMPLE, delay=1.6e-3)
     short, whole = pole_estimates(frf, RIGID, start), identify(frf, RIGID, start, doubt=False)
     assert [item.name for item in short] == ["pole_1"]
@@ -101,7 +101,7 @@ def test_a_fit_that_fails_is_a_result() -> None:
 
 
 def test_a_delay_at_its_limit_is_said() -> None:
-    """The largest delay looked for was too small."""
+    """The largest tested delay was too small."""
     fit = identify(held(SIMPLE), replace(RIGID, delay_max=1e-3))
     assert fit.tf.delay == pytest.approx(1e-3)
     assert any("largest allowed" in warning for warning in fit.warnings)
@@ -119,7 +119,7 @@ def test_a_delay_at_its_limit_is_said() -> None:
     ],
 )
 def test_orders_that_make_no_sense_are_refused(values: dict[str, Any], says: str) -> None:
-    """One line: the value, what is allowed, what to do."""
+    """One line: the value, the allowed range, the next action."""
     with pytest.raises(BadInput) as caught:
         Structure(**values)
     assert says in str(caught.value)
@@ -127,7 +127,7 @@ def test_orders_that_make_no_sense_are_refused(values: dict[str, Any], says: str
 
 
 def test_lines_that_cannot_carry_the_parameters_are_refused() -> None:
-    """Too few, none trusted, no sigma where it is the weight, part samples of delay in z."""
+    """Too few lines, none trusted, no sigma although it is the weight, a fractional delay in z."""
     frf = held(paper_machine())
     with pytest.raises(BadInput, match="number of trusted lines is 3"):
         identify(frf.select(slice(0, 3)), Structure())
@@ -145,7 +145,7 @@ def test_lines_that_cannot_carry_the_parameters_are_refused() -> None:
 
 
 def test_lines_that_are_not_numbers_are_left_out() -> None:
-    """NaN, infinite, zero: not used, whatever ``trusted`` says."""
+    """NaN, infinite, zero: not used, even if ``trusted``."""
     frf = held(paper_machine())
     response = frf.response.copy()
     response[[5, 9, 30]] = [np.nan, np.inf, 0.0]
@@ -155,7 +155,7 @@ def test_lines_that_are_not_numbers_are_left_out() -> None:
 
 
 def test_an_unknown_estimate_names_those_there_are() -> None:
-    """For typing errors."""
+    """The nearest spelling for typing errors."""
     with pytest.raises(BadInput, match="delay, gain, pole_1"):
         identify(noisy(1), RIGID).interval("dealy")
 

@@ -1,4 +1,4 @@
-"""How sure a fit is: Jacobian, covariance, intervals, expected cost."""
+"""Uncertainty of a fit: Jacobian, covariance, intervals, expected cost."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_the_jacobian_is_the_derivative_of_the_prediction() -> None:
 
 
 def correlated_noise(seed: int, neighbour: float) -> FrequencyResponse:
-    """One percent of error, with this correlation between next lines."""
+    """One per cent of error, with this correlation between neighbouring lines."""
     true = held_response(paper_machine(), LINES, RATE)
     rng = np.random.default_rng(seed)
     raw = (rng.normal(size=LINES.size + 1) + 1j * rng.normal(size=LINES.size + 1)) / np.sqrt(2.0)
@@ -73,7 +73,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(neighbour: float) -> Non
 
 
 def test_neighbouring_errors_widen_the_intervals() -> None:
-    """Data that repeat themselves are worth less: about sqrt(1 + 2 * 0.44) in a smooth parameter."""
+    """Correlated data carry less information: about sqrt(1 + 2 * 0.44) in a smooth parameter."""
     seen = correlated_noise(0, 0.44)
     known = identify(seen, MACHINE).interval("delay").sigma
     ignored = identify(replace(seen, line_correlation=np.ones(1)), MACHINE).interval("delay").sigma
@@ -81,7 +81,7 @@ def test_neighbouring_errors_widen_the_intervals() -> None:
 
 
 def test_the_cost_is_judged_against_what_noise_explains() -> None:
-    """Consistent for the right orders; not when the resonance is left out, and the fit says so."""
+    """Consistent for the right orders; not without the resonance, and the fit says so."""
     seen = held(paper_machine(), 0.01, seed=5)
     good, poor = identify(seen, MACHINE), identify(seen, Structure(0, 2, 1))
     assert good.consistent
@@ -91,7 +91,7 @@ def test_the_cost_is_judged_against_what_noise_explains() -> None:
 
 
 def test_relative_error_carries_the_paper_s_names() -> None:
-    """error_cost is the relative error in per cent, confidence what is left of 100."""
+    """error_cost is the relative error in per cent, confidence is 100 minus it."""
     fit = identify(held(paper_machine(), 0.01, seed=6), MACHINE)
     expected = np.sqrt(np.mean(np.abs((fit.measured - fit.response) / fit.measured) ** 2))
     assert fit.relative_error == pytest.approx(expected)
@@ -100,7 +100,7 @@ def test_relative_error_carries_the_paper_s_names() -> None:
 
 
 def test_only_trusted_lines_are_fitted() -> None:
-    """A line that is not trusted has no say, however wrong it is."""
+    """A line that is not trusted has no influence, however wrong it is."""
     seen = held(paper_machine(), 0.01, seed=7)
     trusted = seen.trusted.copy()
     trusted[100:110] = False
@@ -112,7 +112,7 @@ def test_only_trusted_lines_are_fitted() -> None:
 
 
 def test_too_few_lines_are_a_wrong_call() -> None:
-    """The text gives the number, what is needed, and what to do."""
+    """The text gives the number, the required one, and the next action."""
     seen = held(paper_machine(), 0.01)
     few = replace(seen, trusted=np.arange(LINES.size) < 3)
     with pytest.raises(BadInput, match=r"number of trusted lines is 3; allowed: more than 3 for 7 parameters\. Record longer"):
@@ -130,7 +130,7 @@ def test_too_few_lines_are_a_wrong_call() -> None:
     ],
 )
 def test_structures_that_make_no_sense_are_wrong_calls(settings: dict[str, Any], text: str) -> None:
-    """Orders and delays outside their range are named with what is allowed."""
+    """Orders and delays outside their range give an error with the allowed range."""
     with pytest.raises(BadInput, match=text):
         Structure(**settings)
 
@@ -146,13 +146,13 @@ def test_a_fit_that_fails_is_a_result() -> None:
 
 
 def test_an_unknown_estimate_is_a_wrong_call() -> None:
-    """The names that there are, are listed."""
+    """The error lists the existing names."""
     with pytest.raises(BadInput, match="estimate is 'resonance_7'"):
         identify(held(paper_machine(), 0.01), MACHINE).interval("resonance_7")
 
 
 def test_a_delay_at_its_limit_is_told() -> None:
-    """When the true delay is larger than allowed, a warning says to allow more."""
+    """If the true delay is larger than allowed, a warning suggests a larger limit."""
     fit = identify(held(paper_machine(), 0.01), replace(MACHINE, delay_max=1.2e-3))
     assert fit.tf.delay == pytest.approx(1.2e-3)
     assert any("largest allowed" in warning for warning in fit.warnings)

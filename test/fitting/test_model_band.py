@@ -1,4 +1,4 @@
-"""The band of a fitted response: as wide as responses of refitted data scatter."""
+"""The band of a fitted response equals the scatter of responses of refitted data."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_the_band_is_as_wide_as_refitted_responses_scatter() -> None:
 
 
 def test_a_fit_without_an_uncertainty_has_no_band() -> None:
-    """Nothing is drawn as certain that is not known."""
+    """An unknown band is not drawn."""
     fit = identify(held(paper_machine(), 0.02, 1), STRUCTURE)
     unknown = model_band(replace(fit, covariance=np.full_like(fit.covariance, np.nan)))
     assert np.isnan(unknown.magnitude).all()

@@ -1,4 +1,4 @@
-"""Whole recordings: gaps, periods, closed loop, friction and faults, and what is said about them."""
+"""Full recordings: gaps, periods, closed loop, friction and faults, and the notes about them."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_a_gap_costs_only_its_windows() -> None:
 
 
 def test_a_recording_of_gaps_only_is_refused() -> None:
-    """No piece long enough: the longest one is named, and what to set."""
+    """No stretch is long enough: the error names the longest one, and the setting to change."""
     whole = a_rigid()
     seq = whole.seq + whole.seq // 500
     with pytest.raises(BadInput, match=r"longest gap-free run is 500 samples; allowed: 1025 or more.*--set length=125"):
@@ -103,7 +103,7 @@ def replace_length(length: int) -> IdentifierSettings:
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_a_period_is_found_through_measurement_noise(noise: float) -> None:
-    """A measured input repeats itself but for a little noise; noise itself, a step or a ramp do not repeat."""
+    """A measured periodic input repeats except for a little noise; noise, a step or a ramp do not repeat."""
     random = np.random.default_rng(3)
     u: FloatArray = np.asarray(multisine(777, 9000) + noise * random.normal(size=9000), dtype=np.float64)
     assert find_period(u) == 777
@@ -114,7 +114,7 @@ def test_a_period_is_found_through_measurement_noise(noise: float) -> None:
 
 
 def test_a_given_period_is_checked() -> None:
-    """Longer than the data: refused; not the input's: said; the right one: nothing to say."""
+    """Longer than the data: an error; not that of the input: a note; the right one: no note."""
     u = multisine(1000, 12_000)
     assert period_note(u, 1000) == []
     assert "does not repeat after 900 samples" in period_note(u, 900)[0]
@@ -125,7 +125,7 @@ def test_a_given_period_is_checked() -> None:
 
 
 def test_a_closed_loop_is_named() -> None:
-    """An input that follows the tracking error biases H1; a reference that has nothing to do with the input does not matter."""
+    """An input that follows the tracking error biases H1; a reference unrelated to the input has no influence."""
     data, random = rigid(30_000), np.random.default_rng(5)
     reference = np.cumsum(random.normal(size=30_000)) * 1e-4
     position, loop = np.zeros(30_000), np.zeros(30_000)
@@ -162,7 +162,7 @@ def test_friction_is_hinted_at_and_a_linear_machine_is_not_blamed() -> None:
 
 
 def test_an_axis_that_never_turns_shows_no_friction() -> None:
-    """Friction against an even motion one way is the same as a load: nothing is computed of it, so there is no warning of numpy."""
+    """For motion at constant speed in one direction, friction equals a load: it is not computed, so there is no warning of numpy."""
     drive = (np.arange(5_000) % 256 - 128).astype(np.float64)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -170,7 +170,7 @@ def test_an_axis_that_never_turns_shows_no_friction() -> None:
 
 
 def test_windows_with_a_frozen_or_leaping_encoder_are_left_out() -> None:
-    """Counted in a note; a recording of nothing else is refused with the reason."""
+    """Counted in a note; a recording without other samples is refused with the reason."""
     data = rigid(30_000)
     frozen = estimate(recording(data["u"], with_one(data["y"], slice(9000, 9500), 0.0)), "x", SETTINGS)
     assert "left out: in" in frozen.notes[0] and "repeated one value" in frozen.notes[0]
@@ -182,7 +182,7 @@ def test_windows_with_a_frozen_or_leaping_encoder_are_left_out() -> None:
 
 
 def test_a_standstill_before_a_step_is_no_fault() -> None:
-    """Frozen means that the voltage has moved and the encoder has not, for that long."""
+    """Frozen means that the voltage changes and the encoder does not, for that long."""
     count: FloatArray = np.arange(2000, dtype=np.float64)
     step: FloatArray = np.where(count > 1000, 1.0, 0.0)
     assert window_fault(step, np.maximum(count - 1005.0, 0), 250) is None
@@ -194,7 +194,7 @@ def test_a_standstill_before_a_step_is_no_fault() -> None:
 
 
 def test_what_cannot_be_estimated_is_refused_before_any_work() -> None:
-    """Standing still, beyond numbers, outside the band, an unknown axis."""
+    """At rest, overflow, outside the band, an unknown axis."""
     data = rigid(5000)
     still, huge = np.zeros(5000), 1e200 * data["u"]
     for u, y, words in (
@@ -212,7 +212,7 @@ def test_what_cannot_be_estimated_is_refused_before_any_work() -> None:
 
 
 def test_one_window_gives_a_response_without_uncertainty() -> None:
-    """It is shown and said; ``judged`` refuses it for a fit."""
+    """It is shown with a note; ``judged`` refuses it for a fit."""
     found = estimate(a_rigid(1025), "x", SETTINGS)
     assert found.windows == 1 and not found.frf.trusted.any() and "no uncertainty" in found.notes[0]
     with pytest.raises(BadInput, match="2 or more"):
@@ -220,7 +220,7 @@ def test_one_window_gives_a_response_without_uncertainty() -> None:
 
 
 def test_an_output_that_hardly_follows_is_said_and_a_narrow_excitation_is_not_blamed() -> None:
-    """Noise against noise; against it, an axis excited below 10 Hz only, and one in a lot of noise."""
+    """Noise against noise; in contrast, an axis excited only below 10 Hz, and one in strong noise."""
     data, random = rigid(30_000), np.random.default_rng(8)
     alien = estimate(recording(data["u"], random.normal(size=30_000)), "x", SETTINGS)
     assert any("hardly follows" in note for note in alien.notes)
@@ -231,7 +231,7 @@ def test_an_output_that_hardly_follows_is_said_and_a_narrow_excitation_is_not_bl
 
 
 def test_split_keeps_the_last_part_for_the_check() -> None:
-    """Samples are in one part or the other, and a reference goes with them."""
+    """Each sample is in one of the two parts, together with its reference."""
     whole = replace(a_rigid(1000), reference=np.zeros((1000, 1)))
     first, last = split(whole, 0.2)
     assert (len(first), len(last)) == (800, 200) and last.seq[0] == 800 and last.reference is not None and len(last.reference) == 200

@@ -1,4 +1,4 @@
-"""The window, the period and the band follow the record: nobody has to find them."""
+"""Window, period and band are chosen from the record."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PLANT = signal.cont2discrete((np.array([1.0]), np.array([1.0, 20.0, 0.0])), 1 / 
 
 
 def answer(u: FloatArray) -> FloatArray:
-    """Of a mass with friction to its input, with the noise of an encoder."""
+    """The answer of a mass with friction to its input, with encoder noise."""
     y = signal.lfilter(PLANT[0].ravel(), PLANT[1], u)
     return np.asarray(y + 1e-7 * np.random.default_rng(5).standard_normal(u.size))
 
@@ -34,7 +34,7 @@ def noise(size: int, seed: int = 1) -> FloatArray:
 
 @pytest.mark.parametrize(("samples", "window"), [(20_000, 4096), (9_000, 2048), (1_500, 256), (400, 128)])
 def test_the_window_fits_the_record(samples: int, window: int) -> None:
-    """A short record has shorter windows, three or more of them, which is said; a long one has the usual."""
+    """A short record has at least three shorter windows, with a note; a long one has the default windows."""
     u = noise(samples)
     found = estimate(Recording.from_arrays(RATE, u, answer(u)), "x", IdentifierSettings())
     assert found.frf.resolution == pytest.approx(RATE / window) and found.windows >= 3
@@ -42,13 +42,13 @@ def test_the_window_fits_the_record(samples: int, window: int) -> None:
 
 
 def test_a_window_that_was_asked_for_stays() -> None:
-    """Only the usual length is changed."""
+    """Only the default length is changed."""
     u = noise(9_000)
     assert frf(Recording.from_arrays(RATE, u, answer(u)), length=1024).resolution == pytest.approx(RATE / 1024)
 
 
 def test_many_short_stretches_are_used_together() -> None:
-    """Forty stretches of 150 samples give forty windows and more, wherever they begin, and most lines are trusted."""
+    """Forty stretches of 150 samples give at least forty windows, for any start, and most lines are trusted."""
     u = noise(40 * 150)
     whole = Recording.from_arrays(RATE, u, answer(u))
     apart = dataclasses.replace(whole, seq=whole.seq + 7 * (whole.seq // 150))
@@ -58,7 +58,7 @@ def test_many_short_stretches_are_used_together() -> None:
 
 @pytest.mark.parametrize(("period", "times"), [(8192, 4), (512, 2), (511, 2), (511, 5)])
 def test_the_period_is_found_from_two_of_them_on(period: int, times: int) -> None:
-    """Whatever its length; the first is left out where two remain, and the lines above the noise are trusted."""
+    """A period of any length is found; the first is left out if two remain, and the lines above the noise are trusted."""
     u = np.tile(noise(period), times)
     assert find_period(u) == period
     found = estimate(Recording.from_arrays(RATE, u, answer(u)), "x", IdentifierSettings(band_high=250.0))
@@ -67,7 +67,7 @@ def test_the_period_is_found_from_two_of_them_on(period: int, times: int) -> Non
 
 
 def test_what_does_not_repeat_has_no_period() -> None:
-    """Noise, and a sweep, and one period and a half."""
+    """Noise, a sweep, and one and a half periods."""
     once = noise(2048)
     sweep = signal.chirp(np.arange(8192) / RATE, 0.5, 8192 / RATE, 60.0)
     for u in (noise(8192), sweep, np.concatenate((once, once[:1024]))):
@@ -75,7 +75,7 @@ def test_what_does_not_repeat_has_no_period() -> None:
 
 
 def test_half_periods_of_the_other_sign_are_used() -> None:
-    """An odd multisine of which there is one period alone: its two halves tell the response and its uncertainty."""
+    """A single period of an odd multisine: its two halves give the response and its uncertainty."""
     half, lines = 512, np.arange(1, 201, 2)
     t = np.arange(4 * half) / (2 * half)
     phases = np.random.default_rng(2).uniform(0, 2 * np.pi, lines.size)
@@ -93,7 +93,7 @@ def test_half_periods_of_the_other_sign_are_used() -> None:
 
 
 def test_the_band_follows_the_input() -> None:
-    """A sweep that ends at 10 Hz says nothing at 249 Hz: no line beyond it is trusted, and none is fitted."""
+    """A sweep that ends at 10 Hz has no information at 249 Hz: no line above its end is trusted or fitted."""
     t = np.arange(int(60 * RATE)) / RATE
     u = 3 * signal.chirp(t, 0.5, 60, 10) + 1e-3 * noise(t.size)
     y = np.round(answer(u) / 1e-6) * 1e-6
@@ -104,7 +104,7 @@ def test_the_band_follows_the_input() -> None:
 
 
 def test_white_noise_is_trusted_as_far_as_it_goes() -> None:
-    """The same rule takes nothing from an input that excites everything."""
+    """The same rule removes no lines for an input that excites all of them."""
     u = noise(60_000)
     response = frf(Recording.from_arrays(RATE, u, signal.lfilter(PLANT[0].ravel(), PLANT[1], u)), band_high=250.0)
     assert response.trusted.mean() > 0.98
@@ -123,7 +123,7 @@ def test_periods_of_measured_data_are_found() -> None:
 
 
 def test_friction_that_holds_the_output_in_every_window_is_no_broken_encoder() -> None:
-    """An axis that sticks at each reversal is used and it is said; one whose encoder dies after the first window is refused."""
+    """An axis that sticks at each reversal is used with a note; one whose encoder fails after the first window is refused."""
     t = np.arange(6_000) / RATE
     u = np.sin(2 * np.pi * 2.0 * t) + 0.01 * noise(t.size)
     sticking = 1e-3 * np.cumsum(np.where(np.abs(u) > 0.7, u, 0.0))
@@ -135,7 +135,7 @@ def test_friction_that_holds_the_output_in_every_window_is_no_broken_encoder() -
 
 
 def test_an_input_that_is_constant_in_every_stretch_is_no_excitation() -> None:
-    """Twelve speeds in twelve stretches, resampled with some rounding: refused, with the command that reads such tests, and no line of rounding."""
+    """Twelve speeds in twelve stretches, resampled with rounding errors: refused, with the command for such tests; rounding is not fitted."""
     level = np.repeat(np.random.default_rng(2).uniform(-2.0, 2.0, 12), 400)
     u = level * (1.0 + 1e-12 * noise(level.size))
     whole = Recording.from_arrays(RATE, u, answer(level))
@@ -145,7 +145,7 @@ def test_an_input_that_is_constant_in_every_stretch_is_no_excitation() -> None:
 
 
 def test_a_counter_is_no_output() -> None:
-    """What rises evenly, as a clock does, has no response; it is named instead of lines at -600 dB."""
+    """A uniformly rising signal, such as a clock, has no response; the error names it, instead of lines at -600 dB."""
     u = noise(20_000)
     with pytest.raises(BadInput, match=r"rose evenly.*another output"):
         estimate(Recording.from_arrays(RATE, u, 0.2 * np.arange(u.size)), "x", IdentifierSettings())

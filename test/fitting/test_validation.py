@@ -1,4 +1,4 @@
-"""The verdicts on a fit: each passes where it should, and fails with a sentence where it should not."""
+"""The verdicts on a fit: each passes for a good fit, and fails with a sentence for a bad one."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_the_right_orders_are_suggested() -> None:
 
 
 def test_a_missing_resonance_shows_in_cost_and_residual() -> None:
-    """The sentences say that something is missing, and where it is worst: at the pair."""
+    """The sentences say that an effect is missing, and where the error is largest: at the pair."""
     seen = held(paper_machine(), 0.01, seed=3)
     result = validate(identify(seen, Structure(0, 2, 1)), seen, orders=False)
     assert not verdict(result, "cost").ok
@@ -59,7 +59,7 @@ def test_a_missing_resonance_shows_in_cost_and_residual() -> None:
 
 
 def test_an_unidentifiable_combination_is_named() -> None:
-    """Two poles and zeros too many: the parameters that only count together are in the sentence."""
+    """Two poles and zeros too many: the sentence names the parameters that are only determined together."""
     seen = held(paper_machine(), 0.003, seed=1)
     result = validate(identify(seen, Structure(4, 6, 1)), seen, orders=False)
     found = verdict(result, "identifiable")
@@ -86,7 +86,7 @@ def test_the_paper_s_path_is_told_to_be_unphysical() -> None:
 
 
 def test_an_unstable_pole_is_told() -> None:
-    """A response that only a pole on the right explains gives a stable=False verdict that says where."""
+    """A response that only a pole in the right half plane explains gives a stable=False verdict with its frequency."""
     true = function(np.array([100.0]), np.array([1.0, -50.0]))
     seen = response_of(true.response(LINES), 0.001)
     result = validate(identify(seen, Structure(0, 1, 0, delay=0.0, hold="none")), seen, orders=False)
@@ -96,7 +96,7 @@ def test_an_unstable_pole_is_told() -> None:
 
 
 def test_simulation_on_unseen_data_is_part_of_the_verdict() -> None:
-    """Good on data of the same machine; not on those of one whose gain has halved."""
+    """It holds on data of the same machine, and not on those of a machine with half the gain."""
     seen = response_of(held_response(paper_machine(), LINES, RATE), 0.01, seed=7)
     fit = identify(seen, MACHINE)
     u = np.random.default_rng(9).normal(size=20_000)
@@ -118,7 +118,7 @@ def test_without_a_sigma_nothing_is_claimed_about_noise() -> None:
 
 
 def test_nothing_is_ok_that_too_few_numbers_tell() -> None:
-    """Four lines, seven parameters: one verdict says so with the numbers, and no other says ok."""
+    """Four lines, seven parameters: one verdict says so with the numbers, and no other is ok."""
     seen = held(paper_machine(), 0.01, seed=1)
     few = replace(seen.select(slice(80, 112, 8)), line_correlation=np.array([1.0, 0.4]))
     result = validate(identify(few, MACHINE), few, orders=False)
@@ -128,7 +128,7 @@ def test_nothing_is_ok_that_too_few_numbers_tell() -> None:
 
 
 def test_intervals_carry_the_misfit(good: Validation) -> None:
-    """As they are where noise explains the cost; widened by the root of cost over expected where it does not, and then not trustworthy."""
+    """Unchanged if noise explains the cost; otherwise widened by the root of cost over expected cost, and not trustworthy."""
     seen = held(paper_machine(), 0.01, seed=1)
     right, wrong = identify(seen, MACHINE), identify(seen, Structure(0, 2, 1))
     assert good.trustworthy and right.misfit == 1.0 and right.intervals_with_misfit == right.intervals
@@ -139,7 +139,7 @@ def test_intervals_carry_the_misfit(good: Validation) -> None:
 
 
 def test_a_pole_that_runs_away_leaves_the_expected_cost_as_it_is() -> None:
-    """A pole too many goes to where the data see nothing: the expected cost stays that of so many lines."""
+    """A surplus pole moves outside the band of the data: the expected cost remains that of the number of lines."""
     seen = held(function([20.0], [1.0, 240.0, 0.0], 1e-3), 0.01, seed=2)
     found = identify(seen, Structure(0, 3, 1))
     assert found.expected_cost == pytest.approx(len(seen) / 2, rel=0.05)

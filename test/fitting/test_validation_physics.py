@@ -1,4 +1,4 @@
-"""More verdicts on a fit: what a machine cannot be, delays at a bound, roots that cancel, and a model on another's data."""
+"""More verdicts on a fit: unphysical models, delays at a bound, roots that cancel, and a model on other data."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def verdict(fit: Fit, name: str) -> Verdict:
 
 
 def test_negative_coefficients_are_no_physical_axis(good: Fit) -> None:
-    """As in the denominators that the paper prints: read literally, a negative mass, damping or stiffness, and an unstable pole."""
+    """As in the printed denominators of the paper: a negative mass, damping or stiffness, and an unstable pole."""
     assert verdict(good, "feasible").ok
     printed = replace(good, tf=replace(good.tf, denominator=good.tf.denominator * np.array([1.0, -1.0, 1.0, 1.0, 1.0])))
     feasible = verdict(printed, "feasible")
@@ -41,7 +41,7 @@ def test_negative_coefficients_are_no_physical_axis(good: Fit) -> None:
 
 
 def test_a_cost_far_below_noise_is_told(good: Fit) -> None:
-    """Lines that are not independent make a fit look better than it is; a few lines prove nothing."""
+    """Dependent lines make a fit look better than it is; a few lines are not sufficient."""
     assert verdict(good, "cost").ok
     low = verdict(replace(good, cost=0.1 * good.expected_cost), "cost")
     assert not low.ok and "not independent" in low.sentence
@@ -50,7 +50,7 @@ def test_a_cost_far_below_noise_is_told(good: Fit) -> None:
 
 
 def test_a_gain_of_nothing_or_of_the_other_sign_is_told(good: Fit) -> None:
-    """No gain is no axis; a negative gain is wiring, and physical."""
+    """A gain of zero is not an axis; a negative gain is a matter of wiring, and physical."""
     none = verdict(replace(good, tf=replace(good.tf, numerator=np.array([1.0, 0.0]))), "feasible")
     assert not none.ok and "gain is not finite or zero" in none.sentence
     turned = verdict(replace(good, tf=replace(good.tf, numerator=-good.tf.numerator)), "feasible")
@@ -58,7 +58,7 @@ def test_a_gain_of_nothing_or_of_the_other_sign_is_told(good: Fit) -> None:
 
 
 def test_damping_that_is_surely_negative_is_told(good: Fit) -> None:
-    """The whole interval below zero; an interval that reaches over it is no proof."""
+    """Only an interval fully below zero counts; one that contains zero does not."""
     item = good.interval("resonance_1.damping")
     for high, ok in ((-0.01, False), (0.01, True)):
         changed = replace(item, value=-0.02, low=-0.03, high=high)
@@ -75,7 +75,7 @@ def test_a_pole_on_a_zero_is_told(good: Fit) -> None:
 
 
 def test_a_delay_at_a_bound_is_no_estimate(good: Fit) -> None:
-    """At the largest one, and at none; in the z domain delays are whole samples and there is nothing to say."""
+    """At the largest delay, and at zero; in the z domain delays are integer samples, and the verdict does not apply."""
     assert verdict(good, "delay").ok
     late = identify(held(paper_machine(5e-3), 0.005), replace(Structure(), delay_max=2e-3))
     assert not verdict(late, "delay").ok and "may be larger" in verdict(late, "delay").sentence
@@ -87,7 +87,7 @@ def test_a_delay_at_a_bound_is_no_estimate(good: Fit) -> None:
 
 
 def test_an_unstable_model_runs_away_without_a_warning(good: Fit) -> None:
-    """The figure says so, in words, and nothing is written to the terminal by the way."""
+    """The figure says so, and no warning is printed."""
     u = np.random.default_rng(1).normal(size=20_000)
     y = simulate(paper_machine(), RATE, u)
     wild = replace(good, tf=function([1.0], [1.0, -400.0]))
@@ -112,7 +112,7 @@ def samples() -> tuple[FloatArray, FloatArray]:
 
 
 def test_a_right_model_holds_on_new_data_and_a_wrong_one_is_off_where_it_is_wrong(samples: tuple[FloatArray, FloatArray]) -> None:
-    """At the noise floor; another resonance: worst near it; another gain: as much as it is off, everywhere."""
+    """At the noise floor; another resonance: worst near it; another gain: its relative error, everywhere."""
     seen = held(paper_machine(), 0.01, seed=5)
     same = check(paper_machine(), seen, *samples)
     assert same.rms_sigma < 1.3 and "the model holds" in same.sentence and same.relative_error == pytest.approx(same.noise_floor, rel=0.2)
@@ -126,14 +126,14 @@ def test_a_right_model_holds_on_new_data_and_a_wrong_one_is_off_where_it_is_wron
 
 
 def test_a_model_is_compared_with_its_own_hold(samples: tuple[FloatArray, FloatArray]) -> None:
-    """A model fitted to a band-limited input is not blamed for the hold that it does not have."""
+    """A model fitted to a band-limited input is compared without a hold."""
     seen = response_of(paper_machine().response(LINES), 0.01, seed=6)
     assert check(paper_machine(), seen, *samples, "none").rms_sigma < 1.3
     assert check(paper_machine(), seen, *samples, "zoh").rms_sigma > 5
 
 
 def test_what_cannot_be_compared_is_refused(samples: tuple[FloatArray, FloatArray]) -> None:
-    """Other units, another sampling time, no trusted line, a response beyond numbers; too short a signal only loses its check in time."""
+    """Other units, another sampling time, no trusted line, an overflow; too short a signal only loses its check in time."""
     seen, tf = held(paper_machine(), 0.01), paper_machine()
     for wrong, frf, words in (
         (replace(tf, input_unit="A"), seen, r"m/A; allowed: m/V"),
@@ -147,7 +147,7 @@ def test_what_cannot_be_compared_is_refused(samples: tuple[FloatArray, FloatArra
 
 
 def test_no_number_beyond_reason_is_told() -> None:
-    """A model that runs away a thousand times as far as the machine moves has no per cent; sigma and times end at a million."""
+    """A model that diverges to a thousand times the motion gets no per cent; sigma and factors end at a million."""
     u = np.random.default_rng(1).normal(size=4000)
     away = simulation_error(function([1.0], [1.0, -8.0]), 1000.0, u, 1e-3 * np.cumsum(u))
     assert away.nrmse == -np.inf and simulation_sentence(away).endswith("the simulation diverges, or the model has another scale.")

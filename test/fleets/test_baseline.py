@@ -1,4 +1,4 @@
-"""What has left its interval since commissioning: the comparison, the files that it reads, and the nodes that say it."""
+"""Parameters that have left their interval since commissioning: the comparison, its files, and the status of the nodes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ IDENTIFIER, DIAGNOSER = "xy_sysid.nodes.identifier", "xy_sysid.nodes.diagnoser"
 
 
 def estimate(name: str, value: float, unit: str = "V", width: float = 0.004) -> Estimate:
-    """An estimate with an interval of so much of its value on either side."""
+    """An estimate with an interval of this fraction of its value on either side."""
     return Estimate(name=name, value=value, unit=unit, low=value * (1.0 - width), high=value * (1.0 + width))
 
 
@@ -41,7 +41,7 @@ KNOWN = (estimate("gain", 0.1, "m/s/V"), estimate("coulomb_friction.coulomb", 0.
 
 
 def heard(gain: float, friction: float, times: int = AGREEING, spreads: dict[str, float] | None = None) -> StatusMessage:
-    """The status after so many stretches of an axis whose parameters are these parts of those at commissioning."""
+    """The status after several stretches of an axis whose parameters are these fractions of those at commissioning."""
     baseline = Baseline(KNOWN, spreads or {})
     for k in range(times):
         baseline.hear([replace(item, value=item.value * part) for item, part in zip(KNOWN, (gain, friction), strict=True)], k, k + 1)
@@ -49,7 +49,7 @@ def heard(gain: float, friction: float, times: int = AGREEING, spreads: dict[str
 
 
 def test_a_parameter_that_left_its_interval_is_named_with_its_size_and_a_cause() -> None:
-    """Then, now, how much, and what may be the cause, in one sentence; the values give both intervals."""
+    """Values then and now, change, and likely cause, in one sentence; the values give both intervals."""
     told = heard(1.0, 1.45)
     assert told.level == WARN
     assert told.message.startswith("axis x: since commissioning coulomb_friction.coulomb rose from 0.12 to 0.174 V (+45 %). Likely cause: lack of")
@@ -59,7 +59,7 @@ def test_a_parameter_that_left_its_interval_is_named_with_its_size_and_a_cause()
 
 
 def test_what_lies_within_the_usual_spread_has_not_left() -> None:
-    """Recordings of an unchanged axis differ by 3 % where no table says how much."""
+    """Without a table, recordings of an unchanged axis are assumed to differ by 3 %."""
     assert heard(1.03, 0.95).level == OK
 
 
@@ -71,7 +71,7 @@ def test_a_table_that_says_how_little_recordings_differ_finds_smaller_changes() 
 
 
 def test_a_parameter_in_another_unit_is_not_compared() -> None:
-    """A gain per ampere is no smaller or larger than one per volt: the status says so, and judges the others."""
+    """A gain per ampere cannot be compared with one per volt: the status says so, and judges the other parameters."""
     baseline = Baseline(KNOWN, {})
     for k in range(AGREEING):
         baseline.hear([estimate("gain", 0.3, "m/s/A"), KNOWN[1]], k, k + 1)
@@ -84,7 +84,7 @@ def test_a_parameter_in_another_unit_is_not_compared() -> None:
 
 
 def test_a_model_with_other_effects_than_at_commissioning_is_named() -> None:
-    """Gain and pole of a model without friction are not those of one with it; and backlash that is found again and again is news in itself."""
+    """Gain and pole of models with and without friction differ; repeatedly found backlash is reported, too."""
     baseline = Baseline(KNOWN, {}, effects=STANDARD.effects)
     gap = estimate("backlash.gap", 1e-5, "m")
     for k, today in enumerate(([*KNOWN], [*KNOWN, gap], [KNOWN[0], gap], [KNOWN[0], gap])):
@@ -109,7 +109,7 @@ def test_one_or_two_stretches_that_are_off_are_no_change() -> None:
 
 
 def test_stretches_with_common_samples_do_not_count_twice() -> None:
-    """What overlaps is left out; another fit of the same stretch takes its place."""
+    """An overlapping stretch is ignored; another fit of the same stretch replaces the first."""
     baseline = Baseline(KNOWN, {})
     for begin in (0.0, 5.0, 9.0):
         baseline.hear([estimate("gain", 0.2, "m/s/V")], begin, begin + 10.0)
@@ -143,14 +143,14 @@ def test_files_of_other_kinds_are_refused_in_one_line(tmp_path: Path) -> None:
 
 
 def test_a_table_without_a_baseline_is_not_read(tmp_path: Path) -> None:
-    """Its trend takes long, and nothing would be compared with it: neither node reads a table that is not there."""
+    """The trend of a table takes long: neither node reads it without a baseline."""
     nowhere = str(tmp_path / "nowhere")
     assert SinceCommissioning.of_identifier(IdentifierSettings(baseline_table=nowhere), ("x",)).statuses() == []
     assert SinceCommissioning.of_diagnoser(DiagnoserSettings(baseline_table=nowhere), ("x",), STANDARD).statuses() == []
 
 
 def moving(count: int, gain: float = 0.1) -> tuple[Any, Any]:
-    """Voltage and position of a lagging integrator, as that of ``Source``."""
+    """Voltage and position of a lagging integrator, as in ``Source``."""
     rate, pole = 2000.0, 320.0
     u = np.random.default_rng(6).standard_normal(count)
     a = float(np.exp(-pole / rate))
@@ -163,7 +163,7 @@ def moving(count: int, gain: float = 0.1) -> tuple[Any, Any]:
 
 
 def all_heard(statuses: list[Any], seconds: float) -> bool:
-    """The diagnoser has heard so much, but for the newest block or two."""
+    """The diagnoser has received all samples except the newest one or two blocks."""
     return float(newest(statuses, "diagnoser").get("seconds heard (s)", "0")) >= seconds - 0.2
 
 
@@ -175,7 +175,7 @@ def world(tmp_path: Path) -> Iterator[World]:
 
 @needs_ros
 def test_the_identifier_says_that_the_gain_fell(world: World, tmp_path: Path) -> None:
-    """At commissioning the axis had another gain: diagnostics name it, and the axis that has the same gain as ever is quiet."""
+    """One axis had another gain at commissioning: diagnostics name it, and report nothing for the unchanged axis."""
     runs = {name: Recording.from_arrays(2000.0, *moving(20_000, gain)).run("x") for name, gain in (("x", 0.16), ("y", 0.1))}
     xy.save({name: xy.fit(xy.frf(run)) for name, run in runs.items()}, tmp_path / "baseline.yaml")
     statuses = world.statuses("/diagnostics")
@@ -192,7 +192,7 @@ def test_the_identifier_says_that_the_gain_fell(world: World, tmp_path: Path) ->
 
 @needs_ros
 def test_the_diagnoser_compares_each_diagnosis_with_commissioning(world: World, tmp_path: Path) -> None:
-    """Three fits of stretches without a common sample, and the third one says it."""
+    """Three fits of stretches without a common sample; the third one declares the change."""
     from std_srvs.srv import Trigger
 
     run = Recording.from_arrays(2000.0, *moving(20_000, 0.16)).run("x")
@@ -213,7 +213,7 @@ def test_the_diagnoser_compares_each_diagnosis_with_commissioning(world: World, 
 
 @needs_ros
 def test_a_baseline_that_cannot_be_used_ends_the_node_in_one_line(world: World, tmp_path: Path) -> None:
-    """At the start, before anything is heard."""
+    """At the start, before any sample."""
     node = world.start(IDENTIFIER, {"baseline": str(tmp_path / "nothing.yaml")})
     assert node.wait(30.0) == 2
     assert "nothing.yaml" in node.output() and "Traceback" not in node.output()

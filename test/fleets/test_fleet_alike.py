@@ -1,4 +1,4 @@
-"""How a parameter wanders on an axis is told by the axes that are alike, as far as they are alike."""
+"""The wander of a parameter on an axis is learned from similar axes, weighted by their similarity."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COUNT = 16  # recordings of each axis
 
 
 def seen(spreads: Iterable[float], change: float = 0.0) -> list[Evidence]:
-    """What axes tell that scatter by so much; the last half of the recordings may be changed."""
+    """Evidence of axes with this scatter; the last half of the recordings may have a change."""
     random, late = np.random.default_rng(17), np.arange(COUNT) >= COUNT // 2
     series = (spread * random.standard_normal(COUNT) + change * late for spread in spreads)
     return [evidence(Series(np.arange(COUNT, dtype=np.float64), value, np.full(COUNT, 0.0005)))[0] for value in series]
@@ -29,24 +29,24 @@ def spread_of(weights: FloatArray) -> tuple[float, float]:
 
 
 def test_axes_that_are_alike_tell_the_spread_of_the_next_one() -> None:
-    """Twelve axes that scatter by 1 %: so will the thirteenth, within a fifth."""
+    """From twelve axes with a scatter of 1 %, that of the thirteenth is predicted within a fifth."""
     middle, width = spread_of(learned(seen([0.01] * 12)))
     assert 0.008 < middle < 0.0125 and width < 0.35
 
 
 def test_axes_that_differ_leave_it_open() -> None:
-    """Some scatter by 0.3 %, others by 3 %: the next one may do either."""
+    """Some scatter by 0.3 %, others by 3 %: both are possible for the next one."""
     middle, width = spread_of(learned(seen([0.003, 0.03] * 6)))
     assert 0.005 < middle < 0.02 and width > 0.8
 
 
 def test_axes_that_changed_once_do_not_count_as_restless() -> None:
-    """A step of 20 % on each of them is a change, and no wander."""
+    """A step of 20 % on each of them is a change, not wander."""
     assert spread_of(learned(seen([0.01] * 8, change=0.2)))[0] < 0.015
 
 
 def test_an_axis_does_not_tell_its_own_wander() -> None:
-    """Its series is in its statistic already. Alone in a table, an axis wanders as usual."""
+    """Its own series already counts in its statistic. A single axis in a table gets the usual wander."""
     every = seen([0.01, 0.01, 0.01, 0.2])
     assert np.allclose(learned_for_each(every)[3], learned(every[:3]))
     assert np.array_equal(learned_for_each(every[:1])[0], usual()) and np.array_equal(learned([]), usual())

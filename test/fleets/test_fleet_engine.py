@@ -1,4 +1,4 @@
-"""Many recordings -> one table, on several processes, whatever happens to them."""
+"""Many recordings -> one table, on several processes, in spite of any failure of these."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import as_table, read
 from xy_sysid.imports import load, save
 
-SAMPLES, MORE = 300, 1_000  # of most recordings: quick, yet each is fitted and searched; of the last of all
+SAMPLES, MORE = 300, 1_000  # of most recordings: short, but each is fitted and searched; of the last one
 DAYS = ("2026-03-01", "2026-03-02", "2026-03-03")
 
 
@@ -68,7 +68,7 @@ def without_times(rows: list[Row]) -> list[Row]:
 
 
 def test_a_cluster_leaves_the_environment_of_this_process_as_it_was() -> None:
-    """One thread for each worker is no matter of whoever asked for the fleet, whose next report has all cores."""
+    """One thread per worker does not affect the caller, whose next report uses all cores."""
     before = dict(os.environ)
     with connected(Cluster(workers=1)):
         pass
@@ -76,14 +76,14 @@ def test_a_cluster_leaves_the_environment_of_this_process_as_it_was() -> None:
 
 
 def test_the_rows_are_the_same_on_any_number_of_processes(data: Path, table: Path) -> None:
-    """Two processes of a cluster, and this one alone: bit for bit."""
+    """Two processes of a cluster, and this one alone, give the same result bit for bit."""
     here = [row for path in sorted(data.glob("*/*")) for row in rows_of_file(Task(str(path))).rows]
     assert without_times(read(table).to_pylist()) == without_times(as_table(here).to_pylist())
     assert len(here) == 7
 
 
 def test_pandas_polars_and_duckdb_read_the_table(table: Path) -> None:
-    """Parquet with flat columns that every reader takes, and a hidden file beside them that is empty."""
+    """Parquet with flat columns for any reader, and an empty hidden file."""
     gains = read(table, ("machine", "gain")).to_pylist()
     assert pandas.read_parquet(table)[["machine", "gain"]].dropna().to_dict("records") == [row for row in gains if row["gain"] is not None]
     assert polars.read_parquet(table / "*.parquet")["gain"].drop_nulls().to_list() == [row["gain"] for row in gains if row["gain"] is not None]
@@ -93,7 +93,7 @@ def test_pandas_polars_and_duckdb_read_the_table(table: Path) -> None:
 
 
 def test_every_column_in_the_file_has_its_unit_and_meaning(table: Path) -> None:
-    """They go with the data, wherever these go."""
+    """They are in the Parquet files, with the data."""
     field = read(table).schema.field("gain")
     assert field.metadata[b"unit"] == b"m/s/V" and b"velocity gain" in field.metadata[b"meaning"]
 
@@ -112,7 +112,7 @@ def test_what_is_in_the_table_is_not_done_again(data: Path, table: Path, client:
 
 
 def test_a_moved_recording_is_no_second_one(data: Path, client: Any, tmp_path: Path) -> None:
-    """The same content under the same machine and date has one row, wherever it lies, and is not done again."""
+    """The same content with the same machine and date has one row, for any path, and is not analysed again."""
     for folder in ("a", "b"):
         (tmp_path / folder / "mill").mkdir(parents=True)
         npz(tmp_path / folder / "mill" / "2026-03-01.npz", rows=SAMPLES)
@@ -122,7 +122,7 @@ def test_a_moved_recording_is_no_second_one(data: Path, client: Any, tmp_path: P
 
 
 def test_a_killed_process_loses_nothing(data: Path, tmp_path: Path, client: Any) -> None:
-    """kill -9 of a worker in the middle of its task: another takes over, and every recording has its row."""
+    """kill -9 of a worker during its task: another takes over, and every recording has its row."""
     before = set(workers(client))
 
     def kill(now: Progress) -> None:
@@ -136,7 +136,7 @@ def test_a_killed_process_loses_nothing(data: Path, tmp_path: Path, client: Any)
 
 
 def test_a_recording_that_kills_its_process_is_tried_twice_and_is_a_row(data: Path, tmp_path: Path, client: Any) -> None:
-    """Nothing is tried for ever, and its neighbours are not blamed."""
+    """A fatal task is tried only twice, and others are not affected."""
     deadly = tmp_path / "deadly.py"
     tries = tmp_path / "tries"
     deadly.write_text(f"import os\nopen({str(tries)!r}, 'a').write('x')\nos.kill(os.getpid(), 9)\n", encoding="utf-8")
@@ -149,7 +149,7 @@ def test_a_recording_that_kills_its_process_is_tried_twice_and_is_a_row(data: Pa
 
 
 def test_a_recording_that_kills_its_process_is_not_tried_again_by_the_next_run(data: Path, tmp_path: Path, client: Any) -> None:
-    """The table knows it by its hash: a nightly run would otherwise lose two processes every night. With other options it is tried again."""
+    """Its hash is in the table, so that a nightly run does not lose two processes every night. With other options it is tried again."""
     deadly, tries = tmp_path / "deadly.py", tmp_path / "tries"
     lines = ["import os", "from dataclasses import replace", "from xy_sysid.axis.model import STANDARD", f"if os.getpid() != {os.getpid()}:"]
     lines += [
@@ -173,7 +173,7 @@ def workers(client: Any) -> list[int]:
 
 
 def test_a_killed_command_goes_on_where_it_was(tmp_path: Path, client: Any) -> None:
-    """kill -9 of the command in the middle, which works on another's cluster: what it had done is not done again."""
+    """kill -9 of the command, which uses an external cluster: finished work is not repeated."""
     data, table = made(tmp_path / "data"), tmp_path / "table"
     arguments = [*COMMAND, "fleet", str(data), "-o", str(table), "--scheduler", client.scheduler.address]
     command = subprocess.Popen(arguments, env=bare(), stderr=subprocess.DEVNULL)
@@ -185,7 +185,7 @@ def test_a_killed_command_goes_on_where_it_was(tmp_path: Path, client: Any) -> N
 
 
 def test_ctrl_c_keeps_what_is_done(tmp_path: Path) -> None:
-    """Exit code 130, no traceback, no process left, and the rows that were done are in the table."""
+    """Exit code 130, no traceback, no process left, and the finished rows are in the table."""
     data, table = made(tmp_path / "data"), tmp_path / "table"
     arguments = [*COMMAND, "fleet", str(data), "-o", str(table), "--workers", "1"]
     command = subprocess.Popen(arguments, env=bare(), stderr=subprocess.PIPE, text=True, start_new_session=True)
@@ -206,13 +206,13 @@ def running(group: int) -> bool:
 
 
 def waited(happened: Any) -> None:
-    """Until it happened, looked at often; the test's own limit ends it else."""
+    """Wait for an event by polling, up to the time limit of the test."""
     while not happened():
         time.sleep(0.02)
 
 
 def test_only_one_run_writes_a_table(tmp_path: Path, data: Path) -> None:
-    """The second one is told so in one line."""
+    """The second one gets an error in one line."""
     with journal(tmp_path / "table"):
         assert "one that no other run is writing" in refused("fleet", data, "-o", tmp_path / "table")
 
@@ -224,7 +224,7 @@ def test_the_command_says_what_it_did(data: Path, tmp_path: Path) -> None:
 
 
 def test_bags_and_patterns_are_recordings_too_and_counts_are_json(tmp_path: Path, client: Any) -> None:
-    """A bag beside a table file, named by a folder and by a pattern; --json says what was done, and the next run that nothing is left to do."""
+    """A bag next to a table file, named by a folder and by a pattern; --json lists the work, and the next run has none."""
     folder, table = tmp_path / "mill-03", tmp_path / "table"
     folder.mkdir()
     save(load(npz(folder / "2026-03-01.npz", rows=SAMPLES)), folder / "2026-03-02")
@@ -247,7 +247,7 @@ def test_a_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch, data: Path, t
 
 
 def test_the_estimate_holds_what_is_left() -> None:
-    """From the times so far, with their spread: an interval, and none from less than three recordings."""
+    """An interval from the times so far and their spread; none from fewer than three recordings."""
     now = Progress(total=100, done=50, elapsed=50.0, spent=100.0, square=220.0, workers=2)
     low, high = now.remaining() or (0.0, 0.0)
     assert low < 50.0 < high < 60.0 and "3.6e+03 an hour on 2 processes" in now.sentence()

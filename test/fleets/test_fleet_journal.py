@@ -1,4 +1,4 @@
-"""A run writes files of its table's folder, and nothing else."""
+"""A run writes only files of its table's folder."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from xy_sysid.fleets.journal import FILE, journal
 
 @pytest.mark.parametrize("name", [FILE, "mill-01.parquet"])
 def test_a_run_follows_no_link_in_its_table(name: str, tmp_path: Path) -> None:
-    """Refused in one line before any work is done; what the link leads to is untouched, and is not made where it is not there."""
+    """Refused in one line before any work; the target of the link is not changed or created."""
     data, table, other = tmp_path / "mill-01" / "2026-03-01.csv", tmp_path / "table", tmp_path / "precious"
     data.parent.mkdir()
     data.write_text("rubbish\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What is tried first in a recording depends on the recordings alone: it is what the first one of the axis has."""
+"""The effects tried first in a recording are those of the axis's first recording, independent of the order of the analysis."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def in_table(day: str, key: str = "") -> Row:
 
 
 def test_the_first_recording_by_date_tells_the_others_what_is_tried_first() -> None:
-    """In whatever order they are given."""
+    """In any order of the arguments."""
     given = tasks()
     random.Random(3).shuffle(given)
     plan = References(given, ())
@@ -53,7 +53,7 @@ def test_each_machine_has_a_first_recording_of_its_own() -> None:
 
 
 def test_a_first_recording_without_an_answer_gives_way_to_the_next() -> None:
-    """A broken file tells nothing; a rigid axis is an answer, with which nothing is tried first."""
+    """A broken file gives no information; a rigid axis is an answer without effects to try first."""
     plan = References(tasks(), ())
     for row in ({"problem": "rubbish"}, answer("", verdict="not_enough_data"), answer("", verdict="nothing_missing")):
         (asked,) = plan.next()
@@ -62,7 +62,7 @@ def test_a_first_recording_without_an_answer_gives_way_to_the_next() -> None:
 
 
 def test_the_table_knows_earlier_recordings() -> None:
-    """Those that are not given again need no analysis, and those that are given and unchanged are found by their key."""
+    """Recordings not given again need no analysis, and unchanged ones are found by their key."""
     plan = References(tasks(days=DAYS[1:]), [in_table(DAYS[0])])
     assert plan.next() == [] and {task.first for task in plan.rest()} == {NUT} and len(plan.rest()) == 4
     plan = References(tasks(), [in_table(DAYS[0], key="k")])
@@ -72,7 +72,7 @@ def test_the_table_knows_earlier_recordings() -> None:
 
 
 def test_recordings_without_a_date_in_their_path_are_searched_as_if_nothing_were_known() -> None:
-    """Which of them is the first is not known before all are read."""
+    """The first one is unknown before all are read."""
     plan = References(tasks(days=["a", "b"]), ())
     assert plan.next() == [] and [task.first for task in plan.rest()] == [(), ()]
 
@@ -85,7 +85,7 @@ def test_axes_that_the_path_tells_are_apart() -> None:
 
 
 def test_a_row_from_a_known_set_has_the_parameters_of_a_whole_search(tmp_path: Path) -> None:
-    """The row says what was tried first; a set that does not explain the recording leaves no trace in it, except in its key."""
+    """The row lists the effects tried first; a set that does not explain the recording changes only the key."""
     path = tmp_path / "mill-01" / "2026-03-01.npz"
     save(recorded("coulomb_friction=0.15", seconds=10.0), path)
     whole, known, wrong = (

@@ -1,4 +1,4 @@
-"""One recording -> one row an axis, with everything that is known of it, or the reason why not."""
+"""One recording -> one row per axis, with all results, or the reason for missing ones."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_row_has_the_fit_the_diagnosis_and_every_parameter_with_its_interval(r
 
 
 def test_an_effect_that_is_followed_has_parameters_though_it_is_not_named(recording: Recording) -> None:
-    """A trend compares the same model in every recording, whatever the diagnosis names that day."""
+    """A trend compares the same model in every recording, for any diagnosis."""
     row = row_of(recording, "x", Plan(follow=("coulomb_friction", "constant_load")))
     assert row["effects"] == "coulomb_friction" and row["model"] == "coulomb_friction, constant_load"
     assert abs(row["constant_load_load"]) < 0.01 and row["coulomb_friction_coulomb"] == pytest.approx(0.15, rel=0.01)
@@ -75,7 +75,7 @@ def test_what_cannot_be_read_is_a_row_that_says_why(tmp_path: Path) -> None:
 
 
 def test_an_axis_that_cannot_be_fitted_keeps_what_is_known_of_it() -> None:
-    """The reason stands in the row, beside all that could be done."""
+    """The reason is in the row, with all available results."""
     still = Recording.from_arrays(1000.0, np.ones(5000), np.zeros(5000))
     row = row_of(still, "x", Plan())
     assert row["stage"] == "fit" and "constant" in row["problem"]
@@ -83,7 +83,7 @@ def test_an_axis_that_cannot_be_fitted_keeps_what_is_known_of_it() -> None:
 
 
 def test_an_error_that_nobody_thought_of_in_one_axis_leaves_the_others_theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Both axes of a file have a row; that of the faulty one says where the fault is, and keeps what was found before it."""
+    """Both axes of a file have a row; that of the faulty axis names the failed stage, and keeps earlier results."""
     from xy_sysid.fleets import row as module
 
     def diagnosed(recording: Recording, run: Run, plan: Plan) -> Row:
@@ -127,7 +127,7 @@ def test_machine_axis_and_date_come_from_the_path(path: str, pattern: str, name:
 
 
 def test_a_small_file_names_what_the_path_does_not_tell(tmp_path: Path) -> None:
-    """YAML: a pattern, what is followed, and single recordings."""
+    """YAML: a pattern, followed effects, and single recordings."""
     file = tmp_path / "names.yaml"
     file.write_text(
         "pattern: '{machine}/{date}*'\nfollow: [coulomb_friction]\nrecordings:\n  old/a.csv: {machine: mill-01, date: 2025-11-02}\n", encoding="utf-8"
@@ -143,13 +143,13 @@ def test_a_small_file_names_what_the_path_does_not_tell(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("pattern", ["{machin}/*", "{machine}/{machine}"])
 def test_a_pattern_that_means_nothing_is_refused(pattern: str, tmp_path: Path) -> None:
-    """In one line, before any work is done."""
+    """In one line, before any work."""
     npz(tmp_path / "a.npz", rows=100)
     assert "pattern is" in refused("fleet", tmp_path, "-o", tmp_path / "table", "--pattern", pattern)
 
 
 def test_one_recording_is_a_document_or_a_file(tmp_path: Path) -> None:
-    """For those who have their own engine: one file in, one row an axis out, in this process."""
+    """For external engines: one file in, one row per axis out, in this process."""
     path = npz(tmp_path / "2026-03-03.npz", rows=6_000)
     row = cli("fleet", "--one", path).json["rows"][0]
     assert row["axis"] == "x" and row["date"].startswith("2026-03-03") and row["gain"] == pytest.approx(1e-3, rel=0.02)

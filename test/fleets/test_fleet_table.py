@@ -1,4 +1,4 @@
-"""What a table keeps, what new rows replace in it, and which recordings are the same."""
+"""Kept and replaced rows of a table, and identity of recordings."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ def table(folder: Path, *columns: str) -> list[tuple[Any, ...]]:
 
 
 def test_parameters_of_effects_of_ones_own_stay_when_others_are_added(tmp_path: Path) -> None:
-    """A run without the effect knows nothing of its columns, and they belong to rows that it does not touch."""
+    """A run without the effect keeps its columns, which belong to other rows."""
     merged(tmp_path, [row("a.npz", own_drag_size=0.5)])
     merged(tmp_path, [row("b.npz", gain=0.1)])
     assert table(tmp_path, "source", "own_drag_size", "gain") == [("a.npz", 0.5, None), ("b.npz", None, 0.1)]
     merged(tmp_path, [row("a.npz", gain=0.2)])
-    assert "own_drag_size" not in read(tmp_path).column_names  # nothing is in it any more
+    assert "own_drag_size" not in read(tmp_path).column_names  # it is empty now
     assert read(tmp_path).schema.field("gain").metadata[b"unit"] == b"m/s/V"
 
 
 def test_a_recording_has_one_place_whatever_its_machine_was_called_before(tmp_path: Path) -> None:
-    """The pattern was corrected, or the file could not be read at first: what stood there under the other name is gone."""
+    """After a corrected pattern, or a file that is readable now, the rows with the old name are removed."""
     merged(tmp_path, [row("a.npz", machine="x"), row("b.npz", machine="x"), row("other.npz", machine="x-2")])
     merged(tmp_path, [row("a.npz"), row("b.npz")])
     assert table(tmp_path, "machine", "source") == [("mill-01", "a.npz"), ("mill-01", "b.npz"), ("x-2", "other.npz")]
@@ -66,7 +66,7 @@ def test_a_recording_that_was_moved_and_done_by_another_version_is_no_second_one
 
 
 def test_one_file_under_the_names_of_two_axes_is_two_recordings(tmp_path: Path) -> None:
-    """In whatever order they come."""
+    """In any order of arrival."""
     merged(tmp_path, [row("x.npz", file_sha256="same")])
     merged(tmp_path, [row("y.npz", file_sha256="same", axis="y")])
     assert table(tmp_path, "axis", "source") == [("x", "x.npz"), ("y", "y.npz")]
@@ -79,7 +79,7 @@ def test_rows_without_a_date_come_first(tmp_path: Path) -> None:
 
 
 def test_a_damaged_file_is_named(tmp_path: Path) -> None:
-    """Of fifty machines it is this one."""
+    """The error names this one of fifty machines."""
     merged(tmp_path, [row("a.npz"), row("b.npz", machine="mill-02")])
     (tmp_path / "mill-02.parquet").write_bytes(b"PAR1 rubbish")
     for act in (lambda: read(tmp_path), lambda: merged(tmp_path, [row("c.npz", machine="mill-02")])):
@@ -88,7 +88,7 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
 
 
 def test_a_recording_is_found_once_and_any_process_finds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By a relative and an absolute path; a process of a cluster has another working directory."""
+    """By relative and absolute path; a process of a cluster has another working directory."""
     (tmp_path / "data").mkdir()
     npz(tmp_path / "data" / "a.npz", rows=300)
     monkeypatch.chdir(tmp_path)
@@ -99,7 +99,7 @@ def test_a_recording_is_found_once_and_any_process_finds_it(tmp_path: Path, monk
 
 
 def test_a_recording_that_names_its_machine_is_of_that_machine(tmp_path: Path) -> None:
-    """Better than the folder, in which recordings of many machines may lie."""
+    """It takes precedence over the folder, which may hold recordings of many machines."""
     folder = tmp_path / "all"
     folder.mkdir()
     save(replace(recorded("coulomb_friction=0.15", seconds=3.0), machine="mill-07"), folder / "bag")
@@ -124,7 +124,7 @@ def test_a_clock_that_tells_no_date_is_none(first: float) -> None:
 
 
 def test_parts_in_a_gap_have_no_row_and_what_comes_after_it_has(tmp_path: Path) -> None:
-    """Longer than two parts: the numbers of the parts tell where it was."""
+    """A gap longer than two parts: the numbers of the parts show where it was."""
 
     def gap(content: dict[str, np.ndarray]) -> np.ndarray:
         return content["t"] + np.where(np.arange(content["t"].size) < 2_000, 0.0, 3.2)
@@ -135,7 +135,7 @@ def test_parts_in_a_gap_have_no_row_and_what_comes_after_it_has(tmp_path: Path) 
 
 
 def test_a_recording_is_compared_with_few_others_however_many_have_its_name() -> None:
-    """Each task carries the keys that it may have. With all of a name, 10,000 folders with one rec.csv each would send 100 million."""
+    """Each task gets only its possible keys; by file name alone, 10,000 folders with one rec.csv each would need 100 million."""
     rows = [row(f"/data/{day}/rec.csv") for day in range(1000)]
     there = [Path(f"/data/{day}/rec.csv") for day in range(1001)]
     known = Known(rows, {str(path) for path in there})
@@ -187,14 +187,14 @@ def blocks(path: Path, order: list[int]) -> Path:
 
 
 def test_where_the_source_starts_anew_a_part_begins(tmp_path: Path) -> None:
-    """Its clock and its counter begin again; nothing of both lies in one part."""
+    """Its clock and its counter restart; no part contains samples from both sides."""
     found = list(in_parts.in_parts(blocks(tmp_path / "twice", [*range(125), *range(125)]), Reading(), 1.0))
     assert [len(part) for _, part in found] == [1000, 1000, 500, 1000, 1000, 500]
     assert np.array_equal(found[0][1].voltage[:, 0], np.arange(1000.0)) and np.array_equal(found[3][1].voltage, found[0][1].voltage)
 
 
 def test_a_block_that_comes_late_is_no_start_of_a_part(tmp_path: Path) -> None:
-    """One message that lay somewhere for a second: the parts after it are where they would be without it."""
+    """A message delayed by a second: the following parts are the same as without it."""
     path = blocks(tmp_path / "late", [*range(60), *range(61, 125), 60, *range(125, 250)])
     found = dict(in_parts.in_parts(path, Reading(), 1.0))
     assert [len(part) for part in found.values()] == [1000, 1000, 1000, 1000, 1000]
@@ -202,7 +202,7 @@ def test_a_block_that_comes_late_is_no_start_of_a_part(tmp_path: Path) -> None:
 
 
 def test_parts_are_named_and_analysed_as_the_options_say(tmp_path: Path) -> None:
-    """--names and --effect-file of a long recording, which used to mean nothing; of a table they are refused."""
+    """--names and --effect-file apply to a long recording; for a table they are refused."""
     path, names = npz(tmp_path / "long.npz", rows=6_000), tmp_path / "names.yaml"
     names.write_text("follow: [coulomb_friction]\nrecordings:\n  long.npz: {machine: mill-09, date: 2026-03-03}\n", encoding="utf-8")
     own = tmp_path / "own.py"

@@ -1,4 +1,4 @@
-"""What changed, since when, by how much, how sure, and why; and nothing where nothing changed."""
+"""Changes with date, size, certainty and cause; none on an unchanged axis."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_step_is_found_with_its_date_size_and_error() -> None:
 
 
 def test_a_gradual_change_has_its_beginning_and_duration() -> None:
-    """Wear grows: it is one change that takes time, and not many."""
+    """Growing wear is one change with a duration, not many."""
     values = scattered(45)
     values[20:] += 0.3 * np.clip(np.arange(25) / 20.0, 0.0, 1.0)
     (found,) = changes(series(values), usual(), LEVEL)
@@ -57,7 +57,7 @@ def test_a_gradual_change_has_its_beginning_and_duration() -> None:
 
 
 def test_a_change_that_goes_on_is_told_until_now() -> None:
-    """Wear that would take 80 recordings is seen for 25: its size is what has changed with the last of them, and that is known."""
+    """Wear over 80 recordings, of which 25 are available: its size is the change up to the last one."""
     values = scattered(45)
     values[20:] += 0.6 * np.arange(25) / 80.0
     (found,) = changes(series(values), usual(), LEVEL)
@@ -65,7 +65,7 @@ def test_a_change_that_goes_on_is_told_until_now() -> None:
 
 
 def test_two_changes_are_two() -> None:
-    """What follows a change is compared with what came after it."""
+    """Later recordings are compared with those after the change."""
     values = scattered(50)
     values[15:] += 0.1
     values[35:] -= 0.15
@@ -75,7 +75,7 @@ def test_two_changes_are_two() -> None:
 
 
 def test_a_gradual_change_before_another_is_told_whole() -> None:
-    """It is declared while it goes on, and told with all that it has become."""
+    """It is declared while it continues, and reported with its size so far."""
     values = scattered(60)
     values[15:] += 0.3 * np.clip(np.arange(45) / 20.0, 0.0, 1.0)
     values[50:] -= 0.25
@@ -86,7 +86,7 @@ def test_a_gradual_change_before_another_is_told_whole() -> None:
 
 @pytest.mark.parametrize("off", [(20,), (20, 21), (12, 14), (5, 20, 30)])
 def test_a_recording_that_is_off_is_no_change(off: tuple[int, ...]) -> None:
-    """Another load on one day, or on two in a row, is told from a change by what follows."""
+    """Another load on one day, or on two in a row, is distinguished from a change by later recordings."""
     values = scattered(40)
     values[list(off)] += 0.2
     assert changes(series(values), usual(), LEVEL) == ()
@@ -100,7 +100,7 @@ def test_the_statistic_is_what_its_principle_says() -> None:
 
 
 def test_the_spread_is_learned_from_all_axes_together() -> None:
-    """Two recordings after a change of an axis with little history: its own wander is not known, that of its like is."""
+    """Two recordings after a change of an axis with little history: its wander is known from similar axes only."""
     others = [evidence(series(scattered(12, seed=k)))[0] for k in range(12)]
     values = scattered(9, seed=40)
     values[6:] += 0.08
@@ -110,7 +110,7 @@ def test_the_spread_is_learned_from_all_axes_together() -> None:
 
 
 def test_an_effect_that_is_named_from_one_day_on_is_a_change() -> None:
-    """Yes and no have the same statistic. How seldom an unchanged axis is told this and that is learned from all axes."""
+    """Yes and no have the same statistic. The rate of alternation on an unchanged axis is learned from all axes."""
     always, never = np.ones(12, dtype=np.bool_), np.zeros(12, dtype=np.bool_)
     steady = presence.learned([always, never] * 10)
     appeared = np.arange(12) >= 9
@@ -122,7 +122,7 @@ def test_an_effect_that_is_named_from_one_day_on_is_a_change() -> None:
 
 
 def test_unchanged_axes_raise_no_alarm_and_the_next_recording_is_inside() -> None:
-    """The short form of python -m campaigns.bench trend: wander of temperature, load and friction, recordings that are off, seven parameters."""
+    """The short form of python -m campaigns.bench trend: wander of temperature, load and friction, outliers, seven parameters."""
     every = [axis(number, 4242, 15) for number in range(4)]
     found = of_axes([until(one, 14) for one in every], causes())
     assert found.events == () and found.pooled
@@ -136,13 +136,13 @@ def test_unchanged_axes_raise_no_alarm_and_the_next_recording_is_inside() -> Non
 
 
 def test_a_change_of_ten_per_cent_is_found_within_three_recordings() -> None:
-    """Of the gain, with the wander of 20 other axes and half a year behind it; a CUSUM with as few false alarms is later or blind."""
+    """A step of the gain, with 20 other axes and half a year of history; a CUSUM with equal false alarms is later or finds nothing."""
     ours, plain = delays(PARAMETERS[0], before=26, times=4, seed=77)
     assert max(ours) <= 3.0 < min(plain) < np.inf
 
 
 def test_no_test_with_so_few_false_alarms_finds_every_step_of_ten_per_cent_in_friction() -> None:
-    """A limit that the documents state: friction wanders by 2.7 %, and three recordings tell too little of a step; of a step in the gain they tell
+    """A documented limit: friction wanders by 2.7 %, and three recordings do not show a step; for a step in the gain they are
     enough."""
     best, known = limits(FRICTION, before=26, times=20, seed=77)
     assert known < best < 0.95 and known < 0.7
@@ -150,7 +150,7 @@ def test_no_test_with_so_few_false_alarms_finds_every_step_of_ten_per_cent_in_fr
 
 
 def worn(*, friction: float = 1.0, gain: float = 1.0, backlash: bool = False) -> Axis:
-    """An axis that changed with its twelfth recording."""
+    """An axis that changes with its twelfth recording."""
     one = axis(0, 5, 18)
     late = np.arange(18) >= 12
     factors = {"coulomb_friction_coulomb": friction, "gain": gain}
@@ -162,7 +162,7 @@ def worn(*, friction: float = 1.0, gain: float = 1.0, backlash: bool = False) ->
 
 
 def test_no_change_takes_longer_than_it_was_seen() -> None:
-    """The same in a table: it is told over the days until the last recording, with the value of that day."""
+    """The same in a table: the change lasts until the last recording, with the value of that day."""
     one = axis(0, 3, 45)
     each = one.histories[0]
     risen = np.where(np.arange(45) < 20, 1.0, 1.0 + 0.6 * (np.arange(45) - 20) / 80.0)
@@ -174,7 +174,7 @@ def test_no_change_takes_longer_than_it_was_seen() -> None:
 
 
 def test_a_gradual_change_is_gradual_however_many_recordings_have_one_date() -> None:
-    """Three recordings on each Monday: the usual distance is a week in the duration, as it is in the test itself."""
+    """Three recordings on each Monday: the usual distance is a week, in the duration as in the test."""
     one = axis(0, 3, 45)
     dates = tuple(one.dates[3 * (k // 3)] for k in range(45))
     each = one.histories[0]
@@ -186,7 +186,7 @@ def test_a_gradual_change_is_gradual_however_many_recordings_have_one_date() -> 
 
 
 def test_joint_changes_point_to_a_cause() -> None:
-    """Friction and backlash up: the nut. Gain down, and with it friction in volts up: the amplifier."""
+    """Friction and backlash up: the nut. Gain down and friction in volts up: the amplifier."""
     (nut,) = of_axes([worn(friction=1.4, backlash=True), *(axis(k, 5, 18) for k in range(1, 3))], causes()).events
     assert nut.cause is not None and nut.cause.cause == "a worn nut"
     text = sentence(nut, worn())
@@ -196,7 +196,7 @@ def test_joint_changes_point_to_a_cause() -> None:
 
 
 def test_recordings_in_other_units_are_not_compared(tmp_path: Path) -> None:
-    """An axis that is recorded in V first and in A from May on: no gain fell, and how many recordings are left out is told."""
+    """An axis recorded in V first and in A from May on: no change of the gain, and the number of omitted recordings is given."""
     unit, factor = ("V",) * 8 + ("A",) * 6, (1.0,) * 8 + (0.3,) * 6
     amperes = [recorded("mill-00", k, gain * factor[k], input_unit=unit[k]) for k, gain in enumerate(scattered_gains(0))]
     volts = [recorded("mill-01", k, gain) for k, gain in enumerate(scattered_gains(1))]
@@ -229,7 +229,7 @@ MISSING = (
 
 
 def test_what_the_table_cannot_tell_is_told(gone: Path, tmp_path: Path) -> None:
-    """Nothing changed, in what could be read: the command, its JSON and the page say what that was not."""
+    """Nothing changed in the readable data: the command, its JSON and the page list the missing data."""
     said = cli("trend", gone, "-o", tmp_path / "page.html").out
     assert "Nothing changed." in said and all(text in said for text in MISSING), said
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
@@ -241,7 +241,7 @@ def test_what_the_table_cannot_tell_is_told(gone: Path, tmp_path: Path) -> None:
 
 
 def test_a_year_of_twenty_machines_names_the_three_that_go_bad_and_their_causes() -> None:
-    """The short form of python -m campaigns.bench fleet: the rows as they come out of a year, with their wander, without the recordings."""
+    """The short form of python -m campaigns.bench fleet: rows of a year with their wander, without recordings."""
     rows = []
     for number in range(20):
         wander = np.random.default_rng(number).standard_normal((3, 12)) * np.array([[0.02], [0.004], [0.004]])
@@ -268,7 +268,7 @@ def test_the_page_of_the_fleet_lists_every_column() -> None:
 
 
 def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
-    """A file in the same form comes before the table of the package; what it names must be a quantity."""
+    """A file in the same form takes precedence over the table of the package; it may only name known quantities."""
     own = tmp_path / "causes.yaml"
     own.write_text("causes:\n  - {cause: the blue hose, when: [gain down], also: [friction up]}\n", encoding="utf-8")
     found = causes(own).likeliest([("gain", "down"), ("coulomb_friction_coulomb", "up")])
@@ -282,7 +282,7 @@ def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
 
 
 def test_a_quantity_of_a_user_comes_before_those_of_the_package(tmp_path: Path) -> None:
-    """A column that both name measures the quantity of the user."""
+    """A column in both files measures the quantity of the user's file."""
     own = tmp_path / "causes.yaml"
     text = "quantities: {rail drag: [coulomb_friction_coulomb]}\ncauses:\n  - {cause: a dry rail, when: [rail drag up]}\n"
     own.write_text(text, encoding="utf-8")
@@ -291,7 +291,7 @@ def test_a_quantity_of_a_user_comes_before_those_of_the_package(tmp_path: Path) 
 
 
 def test_causes_are_read_before_the_long_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file that is not there is refused before a part of the recording is analysed."""
+    """A missing file gives an error before any part of the recording is analysed."""
     monkeypatch.setattr("xy_sysid.fleets.parts.row_of", lambda *_: pytest.fail("a part was analysed"))
     assert "nowhere.yaml" in refused("trend", npz(tmp_path / "long.npz", rows=4_000), "--every", "1s", "--causes", tmp_path / "nowhere.yaml")
 
@@ -303,7 +303,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_command_names_the_change(table: Path) -> None:
-    """Size, date, certainty and cause in one sentence, and how far recordings of the same axis differ."""
+    """Size, date, certainty and cause in one sentence, and the spread between recordings of an axis."""
     said = cli("trend", table)
     assert said.code == 0, said
     assert (
@@ -331,7 +331,7 @@ def test_the_page_shows_every_parameter_and_opens_offline(table: Path, tmp_path:
 
 
 def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
-    """--every: the gain of a recording of 4 s rises after 2 s; no clock tells the date, so times are from the start, on the page, too."""
+    """--every: the gain of a recording of 4 s rises after 2 s; without a date, times are from the start, also on the page."""
 
     def risen(content: Any) -> Any:
         steps = np.diff(content["y"], prepend=0.0)
@@ -349,7 +349,7 @@ def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("months", "words"), [(0.3, "9 d"), (0.02, "15 h"), (1e-3, "44 min"), (1e-5, "26 s"), (12.0, "12 axis-months")])
 def test_how_long_was_looked_at_is_told_in_a_unit_that_people_read(months: float, words: str) -> None:
-    """A day of parts of one recording is no fraction of a month."""
+    """Parts of one recording of a day do not count as a fraction of a month."""
     one = axis(0, 3, 6)
     months_of_it = one.months
     stretched = tuple(one.dates[0] + (date - one.dates[0]) * months / months_of_it for date in one.dates)
@@ -359,7 +359,7 @@ def test_how_long_was_looked_at_is_told_in_a_unit_that_people_read(months: float
 
 @pytest.mark.filterwarnings("error")
 def test_an_interval_that_knows_nothing_has_no_end() -> None:
-    """A value whose error is a million times its size: no overflow is warned of."""
+    """A value with an error of a million times its size: no warning of overflow."""
     one = axis(0, 3, 6).histories[0]
     found = of_axes([replace(axis(0, 3, 6), histories=(replace(one, low=one.value - 1e6 * one.value, high=one.value + 1e6 * one.value),))], causes())
     assert np.all(np.isinf(found.trends[0].high)) and np.all(np.isfinite(found.trends[0].history.value))
@@ -376,7 +376,7 @@ def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:
 
 
 def test_one_machine_has_the_trend_that_it_has_among_all(table: Path) -> None:
-    """--machine selects what is told, and not what the wander is learned from."""
+    """--machine selects the output, not the axes from which the wander is learned."""
     (one,) = xy.trend(table, machines=["mill-01"]).trends
     every = xy.trend(table)
     assert (one.spread, one.moved) == (every.of("mill-01", "x", "gain").spread, every.of("mill-01", "x", "gain").moved)

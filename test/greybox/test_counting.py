@@ -1,4 +1,4 @@
-"""What an encoder's counts add to a motion: white where many are passed in a sample, slow where few are."""
+"""Quantisation noise of an encoder: white with many counts per sample, at low frequency with few."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def moved(top: float) -> FloatArray:
 @pytest.mark.parametrize("top", [10.0, 40.0, 150.0])
 @pytest.mark.parametrize("counts", [0.1, 0.3, 3.0, 100.0])
 def test_the_floor_of_counts_is_what_counting_adds(counts: float, top: float) -> None:
-    """rms counts a sample from a tenth to a hundred: every band within a factor of two and a half, most within a half."""
+    """0.1 to 100 counts rms per sample: every band within a factor of 2.5, most within a half."""
     speed = moved(top)
     count = 1.0 / (counts * RATE)
     position = np.cumsum(speed) / RATE
@@ -46,7 +46,7 @@ def test_the_floor_of_counts_is_what_counting_adds(counts: float, top: float) ->
 
 
 def test_many_counts_a_sample_are_white_and_few_are_slow() -> None:
-    """The power is that of all counts, spread over Nyquist or below the rate at which they are passed."""
+    """The total power is constant, spread up to Nyquist or below the rate of the counts."""
     layout = bands(RATE, 4096)
     many, few = (counted(layout, moved(40.0), 1.0 / (counts * RATE), 100.0) for counts in (100.0, 0.1))
     assert np.all(np.abs(many - 1.0) < 0.1)
@@ -54,7 +54,7 @@ def test_many_counts_a_sample_are_white_and_few_are_slow() -> None:
 
 
 def test_an_axis_behind_a_coarse_encoder_is_not_blamed_for_its_counts() -> None:
-    """It moves over 19 counts and has no effect: what is said of it is not sure, and no more is left than noise."""
+    """An axis without effects that moves over 19 counts: no confident answer, and the residual is noise."""
     machine = Machine.from_file("rigid.yaml", 21)
     axis = machine.spec.axes[0]
     coarse = replace(axis, drive=axis.drive.model_copy(update={"counts_per_revolution": 50.0}))
@@ -65,7 +65,7 @@ def test_an_axis_behind_a_coarse_encoder_is_not_blamed_for_its_counts() -> None:
 
 
 def test_an_axis_that_runs_far_one_way_makes_no_overflow() -> None:
-    """A motor turned by millions of revolutions: its mean speed is no noise, and nothing is printed about it."""
+    """A motor after millions of revolutions: its mean speed is not noise, and no warning is printed."""
     position = 1e80 * np.arange(20_000.0) / RATE + np.random.default_rng(1).normal(size=20_000)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

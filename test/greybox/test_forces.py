@@ -1,4 +1,4 @@
-"""What an effect pushed is taken over by the others that push by place: exactly, where they are the same law together."""
+"""Other position-dependent forces replace that of a removed effect: exactly, if together they are the same law."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RATE = 1000.0
 
 @pytest.fixture(scope="module")
 def data() -> AxisData:
-    """A slow motion to and fro over a centimetre; what drives it does not matter here."""
+    """A slow motion back and forth over a centimetre; its drive is irrelevant here."""
     t = np.arange(20000) / RATE
     return prepare(RATE, np.random.default_rng(1).normal(size=t.size), 5e-3 * np.sin(2.0 * np.pi * 0.7 * t) + 1e-3 * np.sin(2.0 * np.pi * 3.1 * t))
 
@@ -53,7 +53,7 @@ def test_a_law_that_gives_no_number_takes_nothing_over(data: AxisData) -> None:
 
 @pytest.mark.parametrize("gain", [0.1, -0.1])
 def test_coulomb_friction_stands_in_for_stribeck_with_the_base_taking_what_falls_with_speed(data: AxisData, gain: float) -> None:
-    """Together they brake alike at every speed, and the inertia 1 / (gain pole) stays."""
+    """Friction and drag together are equal at every speed, and the inertia 1 / (gain pole) is unchanged."""
     model = AxisModel(gain, 1e-3, 100.0).with_effect("stribeck_friction", (0.25, 0.02, 0.1))
     found = with_equal_force(data, model, "stribeck_friction", STANDARD["coulomb_friction"])
     (level,) = dict(found.effects)["coulomb_friction"]
@@ -74,7 +74,7 @@ def test_a_level_that_is_the_same_at_all_speeds_stays(data: AxisData) -> None:
 
 
 def scene(data: AxisData, model: AxisModel) -> Scene:
-    """As a base sees it that explains nothing."""
+    """The scene of a base that explains nothing."""
     velocity = data.first_stage(data.velocity)
     position = data.first_stage(data.middle())
     voltage = data.first_stage(data.voltage[:-1])
@@ -82,7 +82,7 @@ def scene(data: AxisData, model: AxisModel) -> Scene:
 
 
 def test_a_spring_that_softens_is_taken_for_a_part_of_a_wave_that_pushes_alike(data: AxisData) -> None:
-    """Cogging of which the travel is two thirds of a period, beside a friction that stays."""
+    """Cogging with two thirds of a period within the travel, and an unchanged friction."""
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("coulomb_friction", (0.2,)).with_effect("return_spring", (40.0, 1e-3, 6000.0))
     found = with_force_from_trace(data, model, "return_spring", STANDARD["cogging"], scene(data, model))
     assert found is not None
@@ -94,7 +94,7 @@ def test_a_spring_that_softens_is_taken_for_a_part_of_a_wave_that_pushes_alike(d
 
 
 def test_a_law_that_leaves_no_trace_on_this_motion_is_not_what_a_spring_was_taken_for(data: AxisData) -> None:
-    """A weight that swings needs half a radian of travel; and friction is no force by place."""
+    """Gravity needs half a radian of travel; and friction is not a position force."""
     model = AxisModel(0.1, 1e-3, 100.0).with_effect("return_spring", (40.0, 1e-3, 0.0))
     for other in ("gravity", "coulomb_friction"):
         assert with_force_from_trace(data, model, "return_spring", STANDARD[other], scene(data, model)) is None

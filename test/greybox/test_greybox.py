@@ -1,4 +1,4 @@
-"""Fits of the base and one effect: to own simulations exactly, and to the other machine's data near the floor."""
+"""Fits of the base and one effect: exact for our own simulations, and near the floor for data of ``xy_sim``."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 RATE = 2000.0
 BASE = AxisModel(0.097, 1.29e-3, 246.0)
 SIMULABLE = [effect.name for effect in STANDARD.acting if effect.simulable]
-MADE = [name for name in SIMULABLE if name in PARTS and PARTS[name].group == "effect"]  # what the other package's machine can have
-SIZES: dict[str, tuple[float, ...]] = {  # where the usual size hardly shows in 30 s, or lies outside the travel
+MADE = [name for name in SIMULABLE if name in PARTS and PARTS[name].group == "effect"]  # parts of the machines of xy_sim
+SIZES: dict[str, tuple[float, ...]] = {  # if the typical size is hardly visible in 30 s, or outside the travel
     "hardening_stiffness": (3e4, 0.0),
     "position_dependent_gain": (0.1, 4e-3, 0.3),
     "cogging": (0.15, 2.5e-3, 0.3),
@@ -39,7 +39,7 @@ SIZES: dict[str, tuple[float, ...]] = {  # where the usual size hardly shows in 
 }
 BASES = {"gravity": replace(BASE, gain=3.0)}  # a joint, which turns by tenths of a radian
 MACHINES = {"gravity": ("joint.yaml", {"travel_min": -2.9, "travel_max": 2.9, "brake": 0.1, "centring": 0.0, "high": 100.0})}
-LOOSE = {"hardening_stiffness.linear", "presliding_hysteresis.damping"}  # next to zero, or next to unseen
+LOOSE = {"hardening_stiffness.linear", "presliding_hysteresis.damping"}  # nearly zero, or nearly invisible
 
 
 @functools.cache
@@ -51,7 +51,7 @@ def voltage(seconds: float, seed: int = 5) -> FloatArray:
 
 
 def own(name: str, seconds: float = 20.0) -> tuple[AxisModel, AxisData]:
-    """A recording by this package's own simulation; what depends on position is told that of the base's motion."""
+    """A recording by this package's simulation; position-dependent laws use the position of the base's motion."""
     base = BASES.get(name, BASE)
     model = base.with_effect(name, SIZES.get(name))
     u = voltage(seconds)
@@ -63,7 +63,7 @@ def own(name: str, seconds: float = 20.0) -> tuple[AxisModel, AxisData]:
 
 @pytest.mark.parametrize("name", SIMULABLE)
 def test_an_effect_is_fitted_back_from_its_own_simulation(name: str) -> None:
-    """Every parameter within 2 per cent of the truth, without being told a start; nothing left above the floor."""
+    """Every parameter within 2 % of the truth, without given start values; no error above the floor."""
     truth, data = own(name)
     found = fit_with(data, fit_base(data), [name])
     assert found.excess < AT_FLOOR
@@ -75,7 +75,7 @@ def test_an_effect_is_fitted_back_from_its_own_simulation(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["gravity", "return_spring"])
 def test_a_drive_that_is_wired_the_other_way_round_meets_the_same_spring(name: str) -> None:
-    """Voltage turned over: the gain changes its sign, and what pulls the axis back does not; a guide with two encoders has that."""
+    """With inverted voltage, the gain changes its sign, and restoring forces do not; as on a guide with two encoders."""
     truth, data = own(name)
     turned = replace(data, voltage=-data.voltage)
     found = fit_with(turned, fit_base(turned), [name])
@@ -104,14 +104,14 @@ def test_nothing_is_left_of_a_clean_machine() -> None:
     """Base parameters to 0.1 per cent, held-out error at the floor."""
     found = machine_base("none")
     assert found.excess < 0.02
-    assert found.held_out_error < 1.04 * machine_data("none").noise  # the encoder alone; laws are trusted to a thousandth of the motion
+    assert found.held_out_error < 1.04 * machine_data("none").noise  # the encoder alone; laws are accurate to a thousandth of the motion
     for key, value in {"gain": 0.097, "delay": 1.29e-3, "pole": 246.0}.items():
         assert found.parameter(key).value == pytest.approx(value, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", MADE)
 def test_the_right_effect_explains_the_other_machine(name: str) -> None:
-    """Physics code that is not ours: the excess falls below 0.05, the held-out error to 1.05 times the floor."""
+    """With independent physics code the excess falls below 0.05, and the held-out error to 1.05 times the floor."""
     base = machine_base(name)
     found = fit_with(machine_data(name), base, [name])
     assert found.excess < AT_FLOOR
@@ -120,7 +120,7 @@ def test_the_right_effect_explains_the_other_machine(name: str) -> None:
 
 
 def test_backlash_is_measured_by_one_step_prediction_rather_than_by_free_simulation() -> None:
-    """Free simulation of contact comes near for this small gap, and is out by more than a percent; one step ahead by less than half of one."""
+    """For this small gap free simulation of contact is close, but more than 1 % wrong; one-step prediction less than 0.5 %."""
     base, data, effect = machine_base("backlash"), machine_data("backlash"), STANDARD["backlash"]
     assert not effect.simulable
     free, followed = fit_with(data, base, ["backlash"]), one_step_fit(data, base, effect)
@@ -131,7 +131,7 @@ def test_backlash_is_measured_by_one_step_prediction_rather_than_by_free_simulat
 
 
 def test_the_wrong_effect_does_not_reach_the_floor() -> None:
-    """Coulomb friction is not a dead zone, and the other way round."""
+    """Coulomb friction is not taken for a dead zone, nor a dead zone for Coulomb friction."""
     for true, wrong in (("coulomb_friction", "dead_zone"), ("dead_zone", "coulomb_friction"), ("cogging", "coulomb_friction")):
         assert fit_with(machine_data(true), machine_base(true), [wrong]).excess > 1.0
 
@@ -178,7 +178,7 @@ def test_the_same_data_give_the_same_fit_bit_for_bit() -> None:
 
 
 def test_a_fit_is_the_same_on_one_core_and_on_three(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Derivatives are worked out on all cores at once: bit for bit as one after the other, with effects that have states of their own."""
+    """Derivatives computed on all cores equal sequential ones bit for bit, also for effects with states."""
     _, data = own("presliding_hysteresis", 8.0)
     fits = []
     for cores in (1, 3):
@@ -197,11 +197,11 @@ def test_data_that_cannot_be_fitted_are_refused() -> None:
     with pytest.raises(BadInput, match="one and the same"):
         prepare(RATE, np.zeros(1000), np.zeros(900))
     with pytest.raises(BadInput, match=r"sampling rate is 0\.0005 Hz; allowed: 3 Hz or more. Check the unit of time"):
-        prepare(0.0005, np.zeros(1000), np.zeros(1000))  # microseconds taken for seconds: sub-steps without end
+        prepare(0.0005, np.zeros(1000), np.zeros(1000))  # microseconds instead of seconds: endless sub-steps
 
 
 def test_friction_is_told_from_drag_where_the_base_alone_is_led_astray() -> None:
-    """A slow machine under slow moves: the base takes friction for drag, and adding friction must leave that valley."""
+    """A slow machine under slow moves: the base fits friction as drag, and the fit with friction must leave that minimum."""
     rate, n = 1000.0, 20_001
     t = np.arange(n) / rate
     u = np.asarray(1.5 * np.sign(np.sin(2 * np.pi * 0.25 * t)) * (1.0 + 0.3 * np.sin(2 * np.pi * 0.11 * t)) + 0.1 * np.sin(2 * np.pi * 7.0 * t))
@@ -216,7 +216,7 @@ def test_friction_is_told_from_drag_where_the_base_alone_is_led_astray() -> None
 
 
 def test_a_parameter_that_nothing_shows_has_no_interval() -> None:
-    """A limit that the voltage never reaches: infinite, not an invented number and not an error."""
+    """A limit that the voltage never reaches has an infinite interval, and is not an error."""
     data = machine_data("none")
     found = fit_with(data, machine_base("none"), ["saturation"], {"saturation": (50.0,)})
     assert found.parameter("saturation.limit").high == np.inf
@@ -224,7 +224,7 @@ def test_a_parameter_that_nothing_shows_has_no_interval() -> None:
 
 
 def test_a_trial_that_runs_away_has_infinite_power_and_warns_nobody() -> None:
-    """Squares beyond what a number holds are no message on somebody's terminal."""
+    """An overflow of squares prints no warning."""
     layout = bands(RATE, 4096)
     spectrum = np.full((3, layout.band.size), 1e200 + 0.0j)
     with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""What is held out: never seen by a fit, spread over the record, and it moves; of several recordings, of each."""
+"""Held-out data: not used by the fit, spread over the record, with motion; in each of several recordings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def moved(samples: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
 
 
 def inside(data: AxisData, begins: np.ndarray) -> np.ndarray:
-    """(n,) the samples of ``velocity`` that some window holds."""
+    """(n,) True for samples of ``velocity`` in a window."""
     held = np.zeros(data.velocity.size, dtype=bool)
     for begin in begins:
         held[begin : begin + data.layout.length] = True
@@ -38,7 +38,7 @@ def inside(data: AxisData, begins: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("sizes", [(1200,), (5000,), (60_000,), (60_000, 40_000), (20_000, 20_000, 20_000)])
 def test_windows_that_judge_share_no_sample_with_those_that_a_fit_sees(sizes: tuple[int, ...]) -> None:
-    """Short, long, and several recordings; no window lies across the joint of two; the first stage sees nothing held out either."""
+    """Short, long, and several recordings; no window spans two recordings; the first stage uses no held-out data either."""
     data = prepare_all(2000.0, [moved(size, k) for k, size in enumerate(sizes)])
     fitted, held, screening = (inside(data, windows.begins) for windows in (data.fitted, data.held_out, data.screening_windows))
     assert fitted.any() and held.any() and screening.any()
@@ -51,20 +51,20 @@ def test_windows_that_judge_share_no_sample_with_those_that_a_fit_sees(sizes: tu
 
 
 def test_what_is_held_out_is_spread_over_the_record() -> None:
-    """Some of each quarter, so that it holds the motion that it judges."""
+    """Some of each quarter is held out, so that it contains similar motion."""
     data = prepare(2000.0, *moved(60_000))
     assert all(part.any() and not part.all() for part in np.array_split(inside(data, data.held_out.begins), 4))
 
 
 def test_of_several_recordings_each_is_held_out_in_part() -> None:
-    """And each is fitted in part."""
+    """Part of each is fitted."""
     data = prepare_all(2000.0, [moved(60_000, 1), moved(40_000, 2)])
     for windows in (data.fitted, data.held_out):
         assert all(inside(data, windows.begins)[step].any() for step in data.steps)
 
 
 def test_an_axis_that_moves_a_tenth_of_the_time_is_not_judged() -> None:
-    """9 %, at the start: nothing is named, and it is said what is lacking."""
+    """9 %, at the start: no effect is named, and the answer says what is missing."""
     u, y = moved(60_000)
     still = 5400
     u[still:] = 0.0
@@ -75,13 +75,13 @@ def test_an_axis_that_moves_a_tenth_of_the_time_is_not_judged() -> None:
 
 
 def test_noise_that_does_not_follow_the_input_is_not_judged() -> None:
-    """Two signals that have nothing to do with each other."""
+    """Two unrelated signals."""
     found = diagnose(2000.0, noise(40_000, 3), np.cumsum(noise(40_000, 4)))
     assert found.verdict == "not_enough_data" and "does not follow the input" in found.sentence
 
 
 def test_two_recordings_of_one_machine_are_one_question() -> None:
-    """Another excitation of the same axis beside the first: the same name, fitted to both, and the parameter is known better."""
+    """A second excitation of the same axis: the same effect, fitted to both, with a smaller interval."""
     pair = [recorded("coulomb_friction", seconds=12.0, seed=seed).run("x") for seed in (21, 21)]
     both, one = diagnose_runs(pair), diagnose_runs(pair[0])
     assert (both.verdict, both.effects) == ("missing_effect", ("coulomb_friction",))
@@ -91,7 +91,7 @@ def test_two_recordings_of_one_machine_are_one_question() -> None:
 
 
 def test_the_first_stage_is_short_where_windows_are_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the first block that a fit sees is cut short by the beginning, the stage grows until it has two windows, not to the whole record."""
+    """If the first fitted block is short, the first stage grows until it has two windows, not to the full record."""
 
     def half_shifted(layout: Bands, spans: Sequence[tuple[int, int]], velocity: FloatArray) -> tuple[Windows, Windows]:
         fitted, held = _blocks(layout.length, *spans[0], SHIFTS // 2)

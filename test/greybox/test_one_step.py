@@ -1,4 +1,4 @@
-"""Backlash and what acts beside it: effects taken out of a recording, judged one sample ahead."""
+"""Backlash and its companions: effects removed from a recording, judged by one-step prediction."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def undone(name: str, values: tuple[float, ...], voltage: FloatArray, position: 
 
 
 def test_a_dead_zone_is_taken_out_of_the_voltage() -> None:
-    """What is left is what comes out of the zone; position and forces stay as they are."""
+    """The voltage behind the zone remains; position and forces are unchanged."""
     u, x = noise(), np.cumsum(noise()) * 1e-5
     held, where, against, through = undone("dead_zone", (0.3,), u, x)
     assert held == pytest.approx(np.where(np.abs(u) > 0.3, u - 0.3 * np.sign(u), 0.0)[:-1])
@@ -48,7 +48,7 @@ def test_a_dead_zone_is_taken_out_of_the_voltage() -> None:
 
 
 def test_a_scale_s_error_is_taken_out_of_the_position() -> None:
-    """The place found, shown by the same scale, is what was shown: to a hundredth of the error's own hundredth."""
+    """The computed position, with the scale's error added, is the measured one: to 1e-4 of the error."""
     x = np.linspace(-0.02, 0.03, 4001)
     _, where, _, _ = undone("lead_error", (8e-6, 0.005, 0.4), noise(), x)
     shown = where + 8e-6 * (np.sin(2.0 * np.pi * where / 0.005 + 0.4) - np.sin(0.4))
@@ -57,7 +57,7 @@ def test_a_scale_s_error_is_taken_out_of_the_position() -> None:
 
 
 def test_a_resonance_is_taken_out_of_the_motion_and_put_back() -> None:
-    """Section and its inverse; what a jump shows at once is the section's first coefficient."""
+    """Section and its inverse; the fraction of a jump that shows at once is the section's first coefficient."""
     values = (0.16, 46.2, 0.02, 0.03)
     x = np.cumsum(noise()) * 1e-5
     _, where, _, through = undone("base_resonance", values, noise(), x)
@@ -68,14 +68,14 @@ def test_a_resonance_is_taken_out_of_the_motion_and_put_back() -> None:
 
 
 def test_cogging_and_a_load_are_forces_against_the_drive() -> None:
-    """At a place, in volts: the one at the motor, the other on the table."""
+    """At a position, in volts: one at the motor, the other on the table."""
     x = np.full(4001, 0.00125)
     assert undone("constant_load", (0.2,), noise(), x)[2][1] == pytest.approx(0.2)
     assert undone("cogging", (0.3, 0.005, 0.1), noise(), x)[2][0] == pytest.approx(0.3 * np.sin(2.0 * np.pi / 4.0 + 0.1))
 
 
 def test_asymmetric_friction_is_coulomb_friction_under_a_load() -> None:
-    """The same motion to rounding, joined they give the same numbers, and taken apart it gives theirs."""
+    """The same motion to rounding; joining and splitting give the same parameters."""
     whole = AxisModel(*BASE).with_effect("asymmetric_friction", (0.2, 0.4))
     parts = AxisModel(*BASE).with_effect("coulomb_friction", (0.2,)).with_effect("constant_load", (0.08,))
     u = noise()
@@ -88,7 +88,7 @@ def test_asymmetric_friction_is_coulomb_friction_under_a_load() -> None:
 
 
 def test_it_is_so_of_a_drive_that_is_wired_the_other_way_round_too() -> None:
-    """A load acts in the sense of the drive, friction in that of the motion; recordings with a negative gain exist."""
+    """A load has the sign of the drive, friction that of the motion; recordings with a negative gain exist."""
     gain, delay, pole = BASE
     whole = AxisModel(-gain, delay, pole).with_effect("asymmetric_friction", (0.2, 0.4))
     parts, u = AxisModel(-gain, delay, pole).with_effect("coulomb_friction", (0.2,)).with_effect("constant_load", (-0.08,)), noise()
@@ -98,7 +98,7 @@ def test_it_is_so_of_a_drive_that_is_wired_the_other_way_round_too() -> None:
 
 
 def test_a_load_larger_than_the_friction_is_not_called_asymmetric_friction() -> None:
-    """There is no such friction: both stay."""
+    """There is no such friction: both effects are kept."""
     model = AxisModel(*BASE).with_effect("coulomb_friction", (0.1,)).with_effect("constant_load", (0.3,))
     assert model.joined() is model
 
@@ -114,7 +114,7 @@ def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
 
 
 def test_friction_that_differs_between_directions_is_found_beside_backlash() -> None:
-    """Coulomb friction is in the filter already; a law with two levels takes its place, no load on the table."""
+    """Coulomb friction is already in the filter; a law with two levels replaces it, without a load on the table."""
     data, base = machine("backlash=30e-6", "asymmetric_friction=0.3,coulomb=0.2")
     start = fit_with(data, base, ["coulomb_friction"], screening=True)
     rungs = extended(data, start, EFFECTS["backlash"]).rungs
@@ -127,7 +127,7 @@ def test_friction_that_differs_between_directions_is_found_beside_backlash() -> 
 
 
 def test_a_load_on_the_table_is_told_from_friction_that_differs_between_directions() -> None:
-    """Across a gap the motor feels the one and not the other; both numbers are right."""
+    """Across a gap only one acts on the motor; both numbers are right."""
     data, base = machine("backlash=30e-6", "constant_load=0.15", "coulomb_friction=0.2")
     start = fit_with(data, base, ["coulomb_friction"], screening=True)
     rungs = extended(data, start, EFFECTS["backlash"]).rungs
@@ -146,7 +146,7 @@ def test_nothing_is_put_beside_backlash_that_stands_alone() -> None:
 
 
 def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:
-    """The gap stays, the dead zone gets its width; what heeds the speed cannot be taken out, and that is said."""
+    """The gap is kept, the dead zone gets its width; an effect that depends on speed cannot be removed, with an error."""
     data, base = machine("backlash=30e-6", "dead_zone=0.15")
     alone = one_step_fit(data, base, EFFECTS["backlash"])
     both = with_one_more(data, STANDARD, base, alone, "dead_zone")
@@ -166,13 +166,13 @@ def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:
     ],
 )
 def test_friction_inside_the_filter_is_the_law_of_its_effect(name: str, values: tuple[float, ...]) -> None:
-    """Without a gap and told next to nothing by the encoder, the filter moves as the simulation does; dry friction is smoothed near rest."""
+    """Without a gap and with a negligible weight of the encoder, the filter moves like the simulation; dry friction is smoothed near rest."""
     u = 3.0 * lfilter([0.3], [1.0, -0.7], noise())
     velocity = simulate(AxisModel(*BASE).with_effect(name, values), RATE, u, np.zeros_like(u))
     position = np.concatenate(([0.0], np.cumsum(velocity))) / RATE
     fit = Innovations(RATE, BASE, 1e6, beside_nothing(u, position), (EFFECTS[name],)).with_soft_contact(10.0)
     closed = fit.start(BASE, (1e-10, 0.4, 30e3, 0.5, 0.0, 0.0, 0.0, 0.0), values)
-    fit.high[5] = closed[5]  # a contact far stiffer than a fit may have
+    fit.high[5] = closed[5]  # a contact far stiffer than the bounds of a fit
     out = fit.innovations(closed, View(u.size - 1, process_noise_factor=0.0, sub_steps=800)) * 1e6
     bent = name == "presliding_hysteresis"
     assert float(np.std(np.diff(out))) * RATE < (0.002 if bent else 0.01) * float(np.std(velocity))
@@ -193,7 +193,7 @@ def beside_nothing(voltage: FloatArray, position: FloatArray) -> Companions:
 def test_friction_that_bends_or_sticks_is_told_from_coulomb_friction_beside_a_gap(
     effect: str, name: str, values: tuple[float, ...], within: float
 ) -> None:
-    """It takes the place of Coulomb friction in the filter, and the innovations fall; Stribeck's numbers stay vague, for sticking is smoothed."""
+    """It replaces Coulomb friction in the filter, and the innovations fall; Stribeck's parameters stay uncertain, because sticking is smoothed."""
     data, base = machine("backlash=5e-6", effect)
     alone = one_step_fit(data, fit_with(data, base, ["coulomb_friction"], screening=True), EFFECTS["backlash"])
     both = with_one_more(data, STANDARD, base, alone, name)

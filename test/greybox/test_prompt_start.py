@@ -1,4 +1,4 @@
-"""Starts that are read from the motion where the base answers so late that nothing can be read with its delay."""
+"""Start values from the motion without the base's delay, if that is too long."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LIMITED = Joint(fs=500.0, seconds=30.0, count=2e-5, mass=0.3, drag=8.0, limit=3.
 
 
 def test_behind_a_base_that_is_late_the_motion_is_seen_without_its_delay_too() -> None:
-    """Else it is seen once."""
+    """Otherwise there is one scene only."""
     data = prepare(LIMITED.fs, *driven(LIMITED, 1))
     base = fit_base(data)
     assert base.model.delay < LATE and scene_of(data, base).prompt is None
@@ -28,7 +28,7 @@ def test_behind_a_base_that_is_late_the_motion_is_seen_without_its_delay_too() -
 
 
 def test_a_limit_is_read_though_the_base_has_a_delay_that_the_axis_has_not() -> None:
-    """With the delay of 40 ms that the base has, nothing can be read at all."""
+    """With the base's delay of 40 ms there are no useful start values."""
     data = prepare(LIMITED.fs, *driven(LIMITED, 1))
     base = fit_base(data)
     late = replace(base, model=replace(base.model, delay=0.04))

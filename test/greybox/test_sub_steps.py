@@ -1,4 +1,4 @@
-"""Sub-steps of a simulation are as long as what the model leaves allows, and no longer."""
+"""Sub-steps of a simulation are as long as the residual error allows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RUBBED = AxisModel(0.1, 1.3e-3, 30.0).with_effect("stribeck_friction", (0.3, 0.2
 
 
 def driven(noise: float, model: AxisModel = RUBBED) -> AxisData:
-    """40 s of a machine that the model describes, with this much noise in the reading, m."""
+    """40 s of a machine that the model describes, with this encoder noise, m."""
     rng = np.random.default_rng(3)
     u: FloatArray = np.repeat(rng.normal(0.0, 1.0, 1000), 20)
     x = np.concatenate(([0.0], np.cumsum(simulate(model, RATE, u, np.zeros_like(u))) / RATE))
@@ -42,7 +42,7 @@ def test_a_noisy_reading_takes_longer_ones() -> None:
 
 @pytest.mark.parametrize("early", [True, False])
 def test_a_model_that_leaves_much_takes_one_step_a_sample(early: bool) -> None:
-    """Its law is wrong by more than steps of a sample could make it."""
+    """The error of its law is larger than that of sub-steps of a sample."""
     assert steps(driven(1e-9), AxisModel(0.05, 1.3e-3, 30.0).with_effect("stribeck_friction", (0.3, 0.2, 5e-3)), early, FINE) == RATE
 
 
@@ -57,10 +57,10 @@ def test_steps_are_never_shorter_than_what_is_asked_for() -> None:
 
 
 def test_a_model_that_runs_away_ends_the_question_without_a_warning() -> None:
-    """Drag that drives ever faster: its power is no number, and nobody is told of overflows."""
+    """Negative drag that diverges: its power overflows, without a warning."""
     away = AxisModel(0.1, 1.3e-3, 30.0).with_effect("asymmetric_viscous_friction", (-1.5,))
     data = driven(1e-9)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert steps(data, away, True, FINE) == RATE
-    assert np.max(np.abs(simulate(away, RATE, data.voltage, data.position))) > 1e160  # the square of it is no number
+    assert np.max(np.abs(simulate(away, RATE, data.voltage, data.position))) > 1e160  # its square overflows

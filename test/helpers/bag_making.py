@@ -43,13 +43,13 @@ def block(values: FloatArray, first: int = 0, axes: tuple[str, ...] = ("x", "y")
 
 
 def numbered(first: int, rows: int = 20, axes: tuple[str, ...] = ("x", "y"), scale: float = 1.0) -> Block:
-    """A block whose values say which sample they belong to: scale * seq, and so on per axis."""
+    """A block whose values identify their sample: scale * seq, and similar for each axis."""
     seq = np.arange(first, first + rows, dtype=np.float64)
     return block(np.column_stack([scale * (seq + 0.25 * i) for i in range(len(axes))]), first, axes)
 
 
 def a_bag(path: Path, messages: Iterable[tuple[str, Block]], **options: Any) -> Path:
-    """A bag with these blocks in this order; a topic without "/" stands in /xy."""
+    """A bag with these blocks in this order; a topic without "/" is in /xy."""
     with BagWriter(path, **options) as writer:
         for count, (topic, content) in enumerate(messages):
             writer.write_block(topic if "/" in topic else f"/xy/{topic}", content, 1_000_000_000 + count * 1_000_000)
@@ -57,7 +57,7 @@ def a_bag(path: Path, messages: Iterable[tuple[str, Block]], **options: Any) -> 
 
 
 def both(firsts: Iterable[int], rows: int = 20) -> list[tuple[str, Block]]:
-    """Voltage and position blocks that begin at these samples, by turns."""
+    """Alternating voltage and position blocks that begin at these samples."""
     return [(kind, numbered(first, rows, scale=scale)) for first in firsts for kind, scale in (("voltage", 1.0), ("position", 1e-3))]
 
 
@@ -109,6 +109,6 @@ def in_chunks(path: Path, storage: str, rows: int) -> None:
 
 
 def assert_true_numbers(recording: Recording) -> None:
-    """Samples are those that the test wrote for their numbers."""
+    """Assert that samples have the values that the test wrote for their numbers."""
     np.testing.assert_array_equal(recording.voltage, recording.seq[:, None] + [0.0, 0.25])
     np.testing.assert_array_equal(recording.position, 1e-3 * (recording.seq[:, None] + np.array([0.0, 0.25])))

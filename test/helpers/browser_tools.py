@@ -72,7 +72,7 @@ OVER_EACH_OTHER = """() => {
 
 
 class Server:
-    """``xy-sysid page`` as a process; ``first`` is the line that it printed, ``address`` the same if it is one."""
+    """``xy-sysid page`` as a process; ``first`` is its first line of output, ``address`` the same if it is an address."""
 
     def __init__(self, folder: Path, *arguments: object, **environment: str) -> None:
         self.log = folder / f"page{time.monotonic_ns()}.log"
@@ -86,11 +86,11 @@ class Server:
         assert self.first, self.said()
 
     def said(self) -> str:
-        """All it wrote on stderr."""
+        """Its output on stderr."""
         return self.log.read_text(encoding="utf-8", errors="replace")
 
     def children(self) -> list[int]:
-        """Its processes: one for each recording, and Python's own helper."""
+        """Its child processes: one for each recording, and Python's helper."""
         return [int(word) for word in Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()]
 
     def end(self) -> int:
@@ -132,13 +132,13 @@ class Tab:
         self.page.goto(address)
 
     def until(self, done: Callable[[], object], seconds: float = 20.0, why: str | Callable[[], str] = "") -> None:
-        """Let the browser work until it is done; it may take PATIENCE times the seconds."""
+        """Let the browser work until ``done``; it may take PATIENCE times the seconds."""
         from playwright.sync_api import Error
 
         def seen() -> bool:
             try:
                 return bool(done())
-            except Error as error:  # the page is being loaded again, as it does by itself after its connection was lost
+            except Error as error:  # the page is being reloaded, as it does by itself after a lost connection
                 if "context was destroyed" not in str(error):
                     raise
                 return False
@@ -155,12 +155,12 @@ class Tab:
         return str(found.first.text_content()) if found.count() else ""
 
     def headline(self) -> str:
-        """Where the axis of the first story stands."""
+        """The headline of the first story."""
         found = self.page.locator("[data-part=headline]")
         return str(found.first.text_content()) if found.count() else ""
 
     def said(self) -> tuple[str, str] | None:
-        """Headline and sentence of the first story, both of one moment; None while the page has no story, as when it is loaded again."""
+        """Headline and sentence of the first story at one moment; None without a story, for example during a reload."""
         script = """() => ["headline", "verdict"].map(part => document.querySelector(`[data-part=${part}]`)?.textContent ?? null)"""
         headline, sentence = self.page.evaluate(script)
         return None if headline is None or sentence is None else (str(headline), str(sentence))
@@ -171,25 +171,25 @@ class Tab:
         return str(found.first.text_content()) if found.count() else ""
 
     def filled(self) -> list[str]:
-        """Words of the filled buttons that can be seen; STOP is always filled and not counted."""
+        """Words of the visible filled buttons; STOP is always filled and not counted."""
         return [text.strip() for text in self.page.locator("main .q-btn--unelevated:visible:not(.q-btn-group *)").all_text_contents()]
 
     def failing(self, by: str) -> str:
-        """Words in the first picture, by frequency, speed, position or time."""
+        """Words in the first figure, by frequency, speed, position or time."""
         plot = self.page.locator(f".js-plotly-plot[aria-label^='Error over the noise floor by {by}']")
         return " ".join(plot.locator(".annotation-text").all_text_contents()) if plot.count() else ""
 
     def over_floor(self) -> float:
-        """Largest error over the noise floor by frequency in the first picture; 0 while it is not drawn."""
+        """Largest error over the noise floor by frequency in the first figure; 0 before it is drawn."""
         (found,) = self.curves("Error over the noise floor by frequency", "this model")
         return max(found, default=0.0)
 
     def notices(self) -> str:
-        """All messages and warnings that can be seen."""
+        """All visible messages and warnings."""
         return " | ".join(text for text in self.page.locator(".notice:visible").all_text_contents())
 
     def curves(self, label: str, *names: str) -> list[list[float]]:
-        """y of named curves of the plot whose description begins so, all of one moment; empty lists while it is not drawn."""
+        """y of named curves of the plot with this start of its description, all at one moment; empty lists before it is drawn."""
         script = """([label, names]) => {
             const plot = [...document.querySelectorAll(".js-plotly-plot")].find(p => (p.getAttribute("aria-label") || "").startsWith(label));
             return names.map(name => {
@@ -206,21 +206,21 @@ class Tab:
 
     @contextmanager
     def unheard(self) -> Iterator[None]:
-        """Of what is typed meanwhile nothing reaches the server, as when a connection breaks."""
+        """Context in which typed text does not reach the server, as with a broken connection."""
         self.page.evaluate("() => { socket.kept = socket.emit; socket.emit = (what, ...rest) => what === 'event' ? 0 : socket.kept(what, ...rest); }")
         yield
         self.page.evaluate("() => { socket.emit = socket.kept; }")
 
     def press(self, act: str) -> None:
-        """A button by what it does."""
+        """Press a button, named by its action."""
         self.page.locator(f"[data-act={act}]").first.click()
 
     def press_until(self, act: str, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
-        """Press a button by what it does until it is done; see ``click_until``."""
+        """Press a button, named by its action, until ``done``; see ``click_until``."""
         self.click_until(self.page.locator(f"[data-act={act}]").first, done, seconds, why)
 
     def click_until(self, what: Any, done: Callable[[], object], seconds: float = 20.0, why: str = "") -> None:
-        """Click, and let the browser work until it is done; again after 20 s, as a click is lost where a page is loaded again after a stall."""
+        """Click, and let the browser work until ``done``; repeat after 20 s, because a reload after a stall loses a click."""
         from playwright.sync_api import TimeoutError as Late
 
         clicked: list[float] = []
@@ -229,7 +229,7 @@ class Tab:
             if done():
                 return True
             if not clicked or time.monotonic() > clicked[-1] + 20.0:
-                with contextlib.suppress(Late):  # it is being loaded again just now, or at work
+                with contextlib.suppress(Late):  # it is being reloaded, or busy
                     what.click(timeout=PATIENCE * 5000)
                     clicked.append(time.monotonic())
             return False
@@ -237,7 +237,7 @@ class Tab:
         self.until(tried, seconds, why)
 
     def places(self) -> dict[str, tuple[float, float]]:
-        """Left and top of each card that can be seen, px from the corner of the page."""
+        """Left and top of each visible card, px from the corner of the page."""
         script = """() => Object.fromEntries([...document.querySelectorAll("main .card")].filter(card => card.offsetParent).map((card, k) => {
             const box = card.getBoundingClientRect();
             return [card.getAttribute("aria-label") || card.className, [box.left + scrollX, box.top + scrollY]];
@@ -245,7 +245,7 @@ class Tab:
         return {name: (float(left), float(top)) for name, (left, top) in self.page.evaluate(script).items()}
 
     def over_each_other(self) -> list[str]:
-        """Pairs of words that can be seen, on the page and in its figures, of which one lies on the other."""
+        """Pairs of visible words, on the page and in its figures, that overlap."""
         return [str(pair) for pair in self.page.evaluate(OVER_EACH_OTHER)]
 
     def wide(self) -> int:
@@ -253,5 +253,5 @@ class Tab:
         return int(self.page.evaluate("document.documentElement.scrollWidth"))
 
     def close(self) -> None:
-        """Away with it."""
+        """Close the tab."""
         self.context.close()

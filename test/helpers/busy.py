@@ -1,4 +1,4 @@
-"""A loaded machine: ``python -m helpers.busy 8 COMMAND...`` runs a command with eight busy processes beside it.
+"""A loaded computer: ``python -m helpers.busy 8 COMMAND...`` runs a command together with eight busy processes.
 
 The exit code is the command's. The busy processes end with it, and also when this process is killed.
 """
@@ -11,11 +11,11 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-PATIENCE = 4.0  # a wait for something that happens gets so many times what it takes alone on the machine: success does not wait
+PATIENCE = 4.0  # factor on timeouts compared with an idle computer: success does not wait
 
 
 def allowed(seconds: float) -> float:
-    """How long something may take that must be quick, when others want the processors, too: s, and as given on a quiet machine."""
+    """Time limit of a fast operation on a loaded computer, s; on an idle one, the given time."""
     return seconds * max(1.0, 2.0 * os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
@@ -30,7 +30,7 @@ while os.getppid() == parent:
 
 @contextmanager
 def busy(count: int) -> Iterator[list[int]]:
-    """So many processes that work without end; the numbers of those, all of them at work."""
+    """Start endlessly busy processes; returns their ids once all are at work."""
     workers: list[subprocess.Popen[bytes]] = []
     try:
         for _ in range(count):

@@ -24,7 +24,7 @@ RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")
 
 @dataclass(frozen=True)
 class Said:
-    """What a command said: exit code, stdout, stderr."""
+    """Result of a command: exit code, stdout, stderr."""
 
     code: int
     out: str
@@ -32,7 +32,7 @@ class Said:
 
     @property
     def json(self) -> Any:
-        """The one document on stdout; fails if there is anything else."""
+        """The JSON document on stdout; fails for any other output."""
         return json.loads(self.out)
 
 
@@ -40,7 +40,7 @@ WIDE = "400"  # columns: so that a test finds a sentence in one line
 
 
 def bare(**changes: str) -> dict[str, str]:
-    """This process' environment as a fresh machine has it: nothing that changes how Python behaves, and the project on the path."""
+    """This process's environment without variables that change Python's behaviour, and with the project on the path."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "LC_")) and name not in ("LANG", "LANGUAGE")}
     return {**kept, "PYTHONPATH": str(ROOT), "COLUMNS": WIDE, **changes}
 
@@ -54,7 +54,7 @@ def cli(*arguments: object) -> Said:
 
 
 def refused(*arguments: object) -> str:
-    """The one line with which a command refuses, having said nothing else."""
+    """The error line of a command without other output."""
     said = cli(*arguments)
     assert said.code == 2, said
     assert said.out == ""

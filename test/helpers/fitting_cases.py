@@ -20,7 +20,7 @@ DENSE: FloatArray = np.asarray(np.linspace(0.5, 999.0, 301), dtype=np.float64)
 
 
 def function(numerator: object, denominator: object, delay: float = 0.0) -> TransferFunction:
-    """From any sequences of coefficients, falling powers."""
+    """A transfer function from sequences of coefficients of falling powers."""
     return TransferFunction(np.atleast_1d(np.asarray(numerator, dtype=np.float64)), np.atleast_1d(np.asarray(denominator, dtype=np.float64)), delay)
 
 
@@ -32,7 +32,7 @@ def paper_machine(delay: float = 1.29e-3) -> TransferFunction:
 
 
 def response_of(true: ComplexArray, relative_noise: float = 0.0, seed: int = 0, frequency: FloatArray = LINES) -> FrequencyResponse:
-    """A measured response: independent errors of a known part of the truth, |error|^2 of sigma^2 on the mean."""
+    """A measured response: independent errors with a known fraction of the truth, |error|^2 of sigma^2 on average."""
     rng = np.random.default_rng(seed)
     size = true.size
     sigma = np.abs(true) * relative_noise
@@ -43,12 +43,12 @@ def response_of(true: ComplexArray, relative_noise: float = 0.0, seed: int = 0, 
 
 
 def held(tf: TransferFunction, relative_noise: float = 0.0, seed: int = 0) -> FrequencyResponse:
-    """What a sampled, held machine shows without a window's blur."""
+    """Response of a sampled machine with a hold, without a window's smoothing."""
     return response_of(held_response(tf, LINES, RATE), relative_noise, seed)
 
 
 def blurred(tf: TransferFunction, offsets: FloatArray, weights: FloatArray) -> FrequencyResponse:
-    """What a window shows of the differenced output: the response times (exp(jwT) - 1), smeared, divided again."""
+    """Response through a window of the differenced output: times (exp(jwT) - 1), smoothed, divided again."""
     total = np.zeros(LINES.size, dtype=np.complex128)
     for offset, weight in zip(offsets, weights, strict=True):
         at = LINES + offset
@@ -59,7 +59,7 @@ def blurred(tf: TransferFunction, offsets: FloatArray, weights: FloatArray) -> F
 
 
 def state_space_response(tf: TransferFunction, frequency: FloatArray) -> ComplexArray:
-    """Behind hold, delay and sampler, by matrix exponentials: an independent way to the same figures."""
+    """Response with hold, delay and sampler by matrix exponentials: an independent method."""
     period = 1.0 / RATE
     a, b, c, d = scipy.signal.tf2ss(tf.numerator, tf.denominator)
     order = a.shape[0]

@@ -1,4 +1,4 @@
-"""Responses of machines that are known exactly, for tests of fits."""
+"""Responses of exactly known machines, for tests of fits."""
 
 from __future__ import annotations
 
@@ -40,6 +40,6 @@ def measured(frequency: FloatArray, response: ComplexArray, sigma: float = 1e-6,
 
 
 def held(tf: TransferFunction, frequency: FloatArray | None = None, sigma: float = 1e-6) -> FrequencyResponse:
-    """What held samples to samples measure, without noise."""
+    """Response from held samples to samples, without noise."""
     frequency = lines() if frequency is None else frequency
     return measured(frequency, held_response(tf, frequency, RATE), sigma)

@@ -16,7 +16,7 @@ COUNT = 14  # recordings of each axis, two weeks apart
 
 
 def recorded(machine: str, number: int, gain: float, **changes: Any) -> Row:
-    """The row of one recording of axis x, so many fortnights after the first one. changes: of its columns."""
+    """The row of one recording of axis x, ``number`` fortnights after the first one. changes: of its columns."""
     source = f"{machine}-{number}"
     name = {"machine": machine, "axis": "x", "date": BEGIN + timedelta(days=14 * number), "source": source, "key": source}
     answer = {"verdict": "nothing_missing", "effects": "", "input_unit": "V", "output_unit": "m", "one_step": False}

@@ -1,4 +1,4 @@
-"""Machines that neither ``xy_sim`` nor the effects know: another program, a controller around them, moves instead of noise."""
+"""Machines independent of ``xy_sim`` and the effects: another program, in closed loop, with moves instead of noise."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from xy_sysid.samples.block import FloatArray
 class Joint:
     """One axis, SI units. fs: Hz, seconds: of the record; count: of the encoder
 
-    mass, drag, coulomb, load: of what moves; spring, rest: pulls to a place; cogging, period: along the travel
-    breaks: friction at rest beyond that in motion, of which a part is left up to speeds of ``fades``
-    moves: (largest place, speed, acceleration) of random moves that a controller (stiffness, damping) follows, or None
+    mass, drag, coulomb, load: of the moving part; spring, rest: stiffness and rest position; cogging, period: along the travel
+    breaks: breakaway friction above that in motion, which decays with speed on the scale ``fades``
+    moves: (largest position, speed, acceleration) of random moves under a controller (stiffness, damping), or None
     shake: rms, and band (Hz), of noise in the drive, around ``offset``
-    limit, zone: of the drive: what is larger is cut off, and so much of it in the middle does nothing
+    limit, zone: of the drive: saturation, and dead zone
     """
 
     fs: float
@@ -93,7 +93,7 @@ def _across(drive: FloatArray, fs: float, gap: float, table: float, coulomb: flo
 
 
 def _moves(random: np.random.Generator, n: int, fs: float, far: float, speed: float, acceleration: float) -> FloatArray:
-    """Smooth moves between random places, with pauses."""
+    """Smooth moves between random positions, with pauses."""
     wanted, i, place = np.zeros(n), 0, 0.0
     while i < n:
         to = random.uniform(-far, far)

@@ -1,4 +1,4 @@
-"""Motors that push a table across a gap, of a make that neither ``xy_sim`` nor the effects know: another contact, other steps in time."""
+"""Motors that move a table across a gap, independent of ``xy_sim`` and the effects: another contact, other time steps."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def driven(machine: GapMachine, seed: int) -> tuple[FloatArray, FloatArray]:
 
 @compiled
 def _run(drive: FloatArray, numbers: FloatArray, steps: int, late: int) -> FloatArray:
-    """The position at each sample: explicit steps, each side stops within a step where it rubs. Hertz: stiff as said at the usual depth."""
+    """The position at each sample: explicit steps; friction stops each side within a step. Hertz: given stiffness at the typical depth."""
     gain, pole, share, guide, half, turn, damping, usual, motor_rubs, table_rubs = numbers
     reduced, table = share * (1.0 - share), 1.0 - share
     h, x, v, x2, v2, shown = STEP, 0.0, 0.0, 0.0, 0.0, np.empty(drive.size)

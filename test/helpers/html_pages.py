@@ -1,4 +1,4 @@
-"""What stands on a page of HTML."""
+"""The content of a page of HTML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Models whose numbers and intervals are known, as a fit would give them."""
+"""Models with known numbers and intervals, like those of a fit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.units import USUAL, Units
 
-RATE = 2000.0  # Hz, of the recording that they are said to be fitted to
+RATE = 2000.0  # Hz, of their assumed recording
 GAIN, DELAY, POLE = 0.097, 1.63e-3, 236.0  # m/s/V, s, rad/s: the table of the paper
 
 
@@ -22,7 +22,7 @@ def axis(*effects: str, delay: float = DELAY) -> AxisModel:
 
 
 def known(*effects: str, spread: float = 0.02, units: Units = USUAL, **wider: float) -> PhysicalModel:
-    """The same with intervals of so many times each number on both sides; wider: of some parameters, ``effect__parameter``, another part."""
+    """The same with intervals of this fraction of each number on both sides; wider: ``effect__parameter`` with another fraction."""
     model = axis(*effects)
     parts = {name.replace("__", "."): part for name, part in wider.items()}
     items = []

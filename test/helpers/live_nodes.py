@@ -25,7 +25,7 @@ def ready(world: World, statuses: list[Any], *names: str) -> None:
 
 
 def drive(world: World, statuses: list[Any], listeners: int = 2) -> None:
-    """Activate once everybody hears everybody, and wait for the end of the signal."""
+    """Activate once all nodes are connected, and wait for the end of the signal."""
 
     def all_there() -> bool:
         return all(int(newest(statuses, name).get("listeners", "0")) >= listeners for name in ("excitation", "ballscrew"))
@@ -37,7 +37,7 @@ def drive(world: World, statuses: list[Any], listeners: int = 2) -> None:
 
 
 class Source:
-    """Publishes made samples of a first-order integrating axis, block by block, with faults on wish."""
+    """Publishes synthetic samples of a first-order integrating axis, block by block, with optional faults."""
 
     def __init__(self, world: World, axes: tuple[str, ...] = ("x", "y"), rate: float = 2000.0) -> None:
         from std_msgs.msg import Float64MultiArray

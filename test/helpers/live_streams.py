@@ -1,4 +1,4 @@
-"""Streams of a simulated machine, block by block, and what the identifier makes of them."""
+"""Streams of a simulated machine, block by block, and the identifier's results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where measured data of real machines lie, for the tests that need them; they are never part of the project."""
+"""Location of recordings of real machines for the tests that need them; they are never part of the project."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from helpers import ROOT
 
 
 def data(path: str) -> Path:
-    """A file or folder below $XY_SYSID_DATA (or ../shared/data beside the project); the test is skipped without it."""
+    """A file or folder below $XY_SYSID_DATA (or ../shared/data next to the project); the test is skipped without it."""
     folder = Path(os.environ.get("XY_SYSID_DATA") or ROOT.parent / "shared" / "data")
     found = folder / path
     if not found.exists():

@@ -1,4 +1,4 @@
-"""Real nodes over real DDS in tests: processes, a listener, lifecycle calls, a domain of its own for each test.
+"""Real nodes over real DDS in tests: processes, a subscriber, lifecycle calls, a separate domain for each test.
 
 Import from a test module that starts with ``pytestmark = needs_ros``.
 """
@@ -34,15 +34,15 @@ WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 
 SHARED = Path("/dev/shm")
-CRASHES = 2  # file descriptor to which a crash is told; of the whole run, once that is known
+CRASHES = 2  # file descriptor for the output of a crash; set for the whole run once it is known
 
 _count = itertools.count()
 
 
 def new_domain() -> int:
-    """A DDS domain that no other test of this run, in this worker or beside it, and hardly one of another run, uses.
+    """A DDS domain that no other test of this run, in any worker, and hardly one of another run, uses.
 
-    One in which no killed process of an earlier run has left its mailboxes: who comes after it writes into some that nobody reads.
+    It has no ports of killed processes of an earlier run, because a new participant would write into ports that nobody reads.
     """
     for _ in range(100 // WORKERS):
         domain = (RUN + next(_count) * WORKERS + WORKER) % 100 + 1
@@ -53,7 +53,7 @@ def new_domain() -> int:
 
 
 def left_behind(domain: int) -> list[Path]:
-    """The mailboxes in shared memory (ports of Fast DDS) of a domain: of those who are in it, and of those who were killed there."""
+    """The ports of Fast DDS in shared memory of a domain, of its present and killed participants."""
     first = 7400 + 250 * domain
     names = {f"fastrtps_port{port}" for port in range(first, first + 250)}
     ports = [path for path in SHARED.glob("*fastrtps_port*") if path.name.removeprefix("sem.").removesuffix("_el").removesuffix("_mutex") in names]
@@ -61,13 +61,13 @@ def left_behind(domain: int) -> list[Path]:
 
 
 def clean(domain: int) -> None:
-    """Take away what those who were killed in a domain left, when nobody is in it any more."""
+    """Remove the ports of killed participants of a domain, if it is empty."""
     for path in left_behind(domain):
         path.unlink(missing_ok=True)
 
 
 class NodeProcess:
-    """A node in a process of its own, beside its log; what it writes goes there and can be read at any time."""
+    """A node in a separate process, with a log file of its output that can be read at any time."""
 
     def __init__(self, program: Sequence[str], arguments: Sequence[str], domain: int, log: Path) -> None:
         environment = bare(ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
@@ -77,7 +77,7 @@ class NodeProcess:
             self.process = subprocess.Popen(command, cwd=log.parent, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT, env=environment)
 
     def output(self) -> str:
-        """All it wrote so far."""
+        """Its output so far."""
         return self._log.read_text(encoding="utf-8", errors="replace")
 
     def send(self, number: signal.Signals) -> None:
@@ -85,18 +85,18 @@ class NodeProcess:
         self.process.send_signal(number)
 
     def wait(self, seconds: float = 10.0) -> int:
-        """Its exit code, of which a quiet machine would have to wait no longer."""
+        """Wait for its exit code; the timeout is that of an idle computer."""
         return self.process.wait(PATIENCE * seconds)
 
     def end(self) -> None:
-        """Whatever it takes."""
+        """End the process by any means."""
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait(5)
 
 
 class Integrator:
-    """A machine whose position is the sum of the voltage, 0.1 m/s/V; silent once ``alive`` is taken away."""
+    """A machine whose position is the sum of the voltage, 0.1 m/s/V; silent after ``alive`` is cleared."""
 
     def __init__(self) -> None:
         self.place, self.alive = np.zeros(2), True
@@ -108,7 +108,7 @@ class Integrator:
 
 
 class World:
-    """One test's corner of ROS: its domain, a node to listen and speak with, and the processes it started."""
+    """The ROS environment of one test: its domain, a node to publish and subscribe, and the started processes."""
 
     def __init__(self, folder: Path) -> None:
         import rclpy
@@ -121,7 +121,7 @@ class World:
         rclpy.init(context=self.context, domain_id=self.domain, signal_handler_options=SignalHandlerOptions.NO)
         self.node: Any = rclpy.create_node("test", namespace="/xy", context=self.context)
         self._executor = EventsExecutor(context=self.context)
-        faulthandler.enable(CRASHES)  # the executor has told Python to write to stderr, which is captured
+        faulthandler.enable(CRASHES)  # the executor has redirected Python to stderr, which is captured
         self._executor.add_node(self.node)
         self._clients: dict[str, Any] = {}
         self.processes: list[NodeProcess] = []
@@ -139,13 +139,13 @@ class World:
         return process
 
     def spin(self, seconds: float) -> None:
-        """Let messages come in for so long."""
+        """Receive messages for this time."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             self._executor.spin_once(timeout_sec=0.01)
 
     def until(self, done: Callable[[], bool], seconds: float = 10.0) -> bool:
-        """Let messages come in until it is done; False if it was not done in PATIENCE times the seconds."""
+        """Receive messages until ``done``; False after PATIENCE times the seconds."""
         end = time.monotonic() + PATIENCE * seconds
         while time.monotonic() < end:
             if done():
@@ -179,7 +179,7 @@ class World:
         return heard
 
     def machine(self, answer: Callable[[Block], Block | None]) -> None:
-        """A machine in this process: every voltage block is answered by what the function makes of it."""
+        """A machine in this process: the function computes the answer to every voltage block."""
         from std_msgs.msg import Float64MultiArray
 
         from xy_sysid.nodes.common import DATA_QOS
@@ -195,7 +195,7 @@ class World:
         self.node.create_subscription(Float64MultiArray, "voltage", play, DATA_QOS)
 
     def call(self, kind: Any, name: str, request: Any, seconds: float = 10.0, times: int = 1) -> Any:
-        """The answer of a service. times: that what may be asked again is asked, as an answer gets lost on a link that has only half come up."""
+        """The answer of a service. times: repetitions of a repeatable call, because a link that is not fully connected loses answers."""
         for _ in range(times):
             answer = self._try(kind, name, request, seconds)
             if answer is not None:
@@ -211,7 +211,7 @@ class World:
         return future.result() if self.until(future.done, seconds) else None
 
     def transition(self, node: str, label: str) -> bool:
-        """Ask a lifecycle node to configure, activate, deactivate, cleanup, ...; whether it did."""
+        """Request configure, activate, deactivate, cleanup, ... of a lifecycle node; True if it succeeded."""
         from lifecycle_msgs.msg import Transition
         from lifecycle_msgs.srv import ChangeState
 
@@ -221,7 +221,7 @@ class World:
             answer = self._try(ChangeState, f"/xy/{node}/change_state", ChangeState.Request(transition=Transition(label=label)), 4.0)
             if answer is not None:
                 return bool(answer.success)
-            if self.state(node) != before:  # done, and the answer was lost on a link that had only half come up
+            if self.state(node) != before:  # done, but the answer was lost on a link that was not fully connected
                 return self.state(node) == goal
         return False
 
@@ -236,7 +236,7 @@ class World:
         raise AssertionError(f"{node} does not tell its state")
 
     def set_parameter(self, node: str, name: str, value: bool | int | float | str | list[str]) -> tuple[bool, str]:
-        """Whether a parameter was changed, and the node's sentence if not."""
+        """True if a parameter was changed, and the node's sentence otherwise."""
         from rcl_interfaces.srv import SetParameters
         from rclpy.parameter import Parameter
 

@@ -1,6 +1,6 @@
 """A joint under a position controller, with load and encoder noise: the truth for closed-loop identification.
 
-J y'' + c y' = u + load, the effort held between samples; the controller sees the noisy position: u = stiffness (r - y) - damping dy/dt.
+J y'' + c y' = u + load, the effort held between samples; the controller measures the noisy position: u = stiffness (r - y) - damping dy/dt.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Servo:
         return np.asarray(signal.freqz(*self.held(), worN=frequency, fs=self.rate)[1])
 
     def run(self, reference: FloatArray, seed: int = 1) -> Recording:
-        """What comes of a reference, (n,) rad."""
+        """The recording for a reference, (n,) rad."""
         random = np.random.default_rng(seed)
         (_, b1, b2), (_, a1, a2) = self.held()
         load = self.load * random.standard_normal(reference.size)

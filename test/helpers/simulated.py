@@ -1,4 +1,4 @@
-"""Recordings of the simulated machine, whose physics and numerics are others."""
+"""Recordings of the simulated machine, with other physics code and numerics."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ def recorded(
     axes: tuple[str, ...] = ("x",),
     block: int = 20,
 ) -> Recording:
-    """A copy for each who asks; it is simulated once.
+    """A copy for each caller; it is simulated once.
 
     counts: of the encoder, per revolution of 5 mm; 0 as the machine has it; encoder_on: motor or table; axes: of the table, x alone or both
-    block: samples that are driven at once; the more, the less work
+    block: samples driven at once; more means less work
     """
     return copied(_simulated(effect, seconds, seed, counts, encoder_on, axes, block))
 
 
 def copied(recording: Recording) -> Recording:
-    """The same with samples of its own."""
+    """A copy with its own samples."""
     return replace(recording, voltage=recording.voltage.copy(), position=recording.position.copy())
 
 

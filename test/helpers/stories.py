@@ -1,4 +1,4 @@
-"""The story of one simulated axis, told once."""
+"""The story of one simulated axis, computed once."""
 
 from __future__ import annotations
 
@@ -26,6 +26,6 @@ def told() -> Story:
 
 
 def with_effects(story: Story, run: Run, *effects: str) -> Story:
-    """A story whose model is to have exactly these effects, as the nodes ask for them."""
+    """A story whose model gets exactly these effects, as requested by the nodes."""
     job = Job(act="effects", run=run, story=story, effects=effects, tolerance=story.tolerance)
     return [made for _, made in perform(job, STANDARD) if made is not None][-1]

@@ -1,4 +1,4 @@
-"""Tables as other people write them, of an axis that is known."""
+"""Tables in other formats, of a known axis."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ T, U, Y = MADE["t"], MADE["u"], MADE["y"]
 
 
 def csv_of(path: Path, columns: Mapping[str, FloatArray | Sequence[str]], separator: str = ",") -> Path:
-    """A CSV file with these columns; words as they are, and an empty cell for what is not a number."""
+    """A CSV file with these columns; text unchanged, and an empty cell for NaN."""
     file = path / "data.csv"
     cells = [[one if isinstance(one, str) else "" if np.isnan(one) else repr(float(one)) for one in column] for column in columns.values()]
     lines = [separator.join(columns), *(separator.join(row) for row in zip(*cells, strict=True))]

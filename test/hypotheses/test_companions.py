@@ -1,4 +1,4 @@
-"""What stands beside an effect that only one-step prediction can judge, and what does not."""
+"""Companions of an effect that only one-step prediction can judge."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base
 from xy_sysid.hypotheses.companions import Demand, Extended, extended
 
-BAR = 5e-3  # m/s one sample ahead: more than what any filter with this gap leaves
+BAR = 5e-3  # m/s, one-step error: more than that of any filter with this gap
 
 
 @pytest.fixture(scope="module")
 def data() -> AxisData:
-    """Of a motor that rubs before a gap of 0.1 mm, behind an amplifier that lags by 2 ms."""
+    """A motor with friction before a gap of 0.1 mm, behind an amplifier lag of 2 ms."""
     return prepare(2000.0, *across_gap(1e-4, 0.1, 0.15, 1, lag=2e-3))
 
 
@@ -28,7 +28,7 @@ def followed(data: AxisData, base: GreyboxFit, bar: float, masked: bool = False)
 
 
 def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(data: AxisData) -> None:
-    """Cogging that is not there, beside a lag that is."""
+    """Cogging that is not present, with a lag that is."""
     base = fit_base(data)
     crowded = replace(base, model=base.model.with_effect("amplifier_lag", (1e-3,)).with_effect("cogging", (0.02, 0.01, 0.0)))
     found = followed(data, crowded, BAR)
@@ -37,7 +37,7 @@ def test_what_a_simulation_had_and_is_of_no_use_beside_a_gap_goes(data: AxisData
 
 @pytest.mark.parametrize("masked", [False, True])
 def test_without_what_a_gap_hides_no_filter_follows_the_motor(data: AxisData, masked: bool) -> None:
-    """An encoder's count of 1 um is 0.6 mm/s one sample ahead."""
+    """A count of 1 um is a one-step error of 0.6 mm/s."""
     last = followed(data, fit_base(data), 2e-3, masked).rungs[-1][1]
     assert ("amplifier_lag" in last.model) is masked
     assert (last.held_out_error < 1e-3) is masked

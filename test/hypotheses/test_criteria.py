@@ -1,4 +1,4 @@
-"""The numbers that steer the search: one table, each with its reason, and none beside it."""
+"""The numbers that steer the search: all in one table, each with its reason."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STEERED = [path for package in ("hypotheses", "diagnosis") for path in sorted((R
 
 
 def bare_numbers(path: Path) -> list[str]:
-    """Names of a module's own numbers; zero steers nothing."""
+    """Names of a module's numeric constants, except zeros."""
     found = []
     for item in ast.parse(path.read_text(encoding="utf-8")).body:
         if isinstance(item, ast.Assign):
@@ -31,7 +31,7 @@ def bare_numbers(path: Path) -> list[str]:
 
 
 def test_each_number_has_a_name_of_its_own() -> None:
-    """One meaning each."""
+    """Each name has one meaning."""
     names = [row.name for row in criteria.TABLE]
     assert names
     assert len(set(names)) == len(names)
@@ -39,14 +39,14 @@ def test_each_number_has_a_name_of_its_own() -> None:
 
 @pytest.mark.parametrize("row", criteria.TABLE, ids=lambda row: row.name)
 def test_each_number_says_in_which_unit_it_is_and_why(row: criteria.Criterion) -> None:
-    """A sentence of what was measured, not a repetition of the name."""
+    """A reason from a measurement, not a repetition of the name."""
     assert row.unit
     assert len(row.because.split()) >= 6, row.because
     assert row.value > 0.0
 
 
 def test_each_number_is_used() -> None:
-    """By another module; what nothing asks for is deleted."""
+    """Another module uses it; unused numbers must be deleted."""
     body = ast.parse(CRITERIA.read_text(encoding="utf-8")).body
     given = {ast.unparse(item.targets[0]) for item in body if isinstance(item, ast.Assign) and _is_number(item)}
     assert len(given) == len(criteria.TABLE)
@@ -64,7 +64,7 @@ def _is_number(item: ast.Assign) -> bool:
 
 @pytest.mark.parametrize("path", STEERED, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_no_other_module_of_the_search_holds_a_number_of_its_own(path: Path) -> None:
-    """A number that steers stands in criteria, with its reason."""
+    """A number that steers the search is in criteria, with its reason."""
     numbers = bare_numbers(path)
     assert not numbers, f"{path.name} holds {', '.join(numbers)}: put them into criteria"
 

@@ -1,4 +1,4 @@
-"""Noise on the input is told from what is missing: the machine never felt it."""
+"""Measurement noise on the input is distinguished from a missing effect."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def test_white_noise_on_the_input_is_nothing_that_is_missing() -> None:
 
 
 def test_a_slow_force_that_nobody_modelled_is_no_noise() -> None:
-    """As a cable's pull or a wandering friction: its spectrum falls with frequency."""
+    """A force like that of a cable or wandering friction: its spectrum falls with frequency."""
     slow = sosfilt(butter(1, 0.3, fs=RATE, output="sos"), default_rng(8).standard_normal(12_000))
     data = joint(JOINT, 0.05 * slow / np.std(slow))
     assert input_noise(data, fit_base(data)) is None
 
 
 def test_friction_is_no_noise() -> None:
-    """What it leaves follows the motion."""
+    """Its residual error follows the motion."""
     data = joint(JOINT.with_effect("coulomb_friction", (0.2,)), 0.01 * default_rng(8).standard_normal(12_000))
     assert input_noise(data, fit_base(data)) is None
     assert diagnose_prepared(data).effects == ("coulomb_friction",)

@@ -1,4 +1,4 @@
-"""One score: how well an error is explained by the encoder's noise and by what the model does not have."""
+"""The score: likelihood of an error from encoder noise and unmodelled causes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def data() -> AxisData:
 
 @pytest.mark.parametrize(("force", "motion"), [(1e-3, 0.0), (0.0, 1e-6), (1e-3, 1e-6), (1e-4, 1e-7)])
 def test_the_powers_that_made_an_error_are_found(force: float, motion: float) -> None:
-    """From the error's power by band, whichever of the two made it."""
+    """From the error's power by band, for either cause."""
     objective = Objective(FLOOR, LINES, RESPONSE)
     power = FLOOR + force * RESPONSE + motion
     found = objective.spectrum(power)
@@ -36,40 +36,40 @@ def test_the_powers_that_made_an_error_are_found(force: float, motion: float) ->
 
 
 def test_an_error_that_is_the_floor_scores_nothing() -> None:
-    """Nothing is unmodelled, and the score is 0; twice the floor is worse."""
+    """At the floor nothing is unmodelled, and the score is 0; twice the floor is worse."""
     objective = Objective(FLOOR, LINES, RESPONSE)
     assert objective.of_power(FLOOR) == pytest.approx(0.0, abs=1e-4)
     assert objective.of_power(2.0 * FLOOR) == pytest.approx(np.log(2.0), rel=0.02)
 
 
 def test_a_model_that_runs_away_has_the_worst_score() -> None:
-    """Infinite, and no error."""
+    """An infinite score, without an exception."""
     objective = Objective(FLOOR, LINES, RESPONSE)
     assert objective.of_power(np.full(30, np.inf)) == np.inf
 
 
 def test_a_scaled_axis_scores_the_same() -> None:
-    """In millimetres as in metres: the objective knows no unit."""
+    """The same in millimetres and in metres: the objective is independent of units."""
     one, other = Objective(FLOOR, LINES, RESPONSE), Objective(1e6 * FLOOR, LINES, 1e6 * RESPONSE)
     power = FLOOR + 1e-3 * RESPONSE
     assert other.of_power(1e6 * power) == pytest.approx(one.of_power(power), rel=1e-6)
 
 
 def test_the_response_to_a_force_is_measured_where_the_motion_answers() -> None:
-    """That of a simulated axis in open loop: a gain and a pole."""
+    """The response of a simulated axis in open loop: a gain and a pole."""
     rate, gain, pole = 2000.0, 0.1, 150.0
     voltage = np.random.default_rng(1).normal(size=40_000)
     velocity = simulate(AxisModel(gain, 0.0, pole), rate, voltage, np.zeros(voltage.size))
     known = prepare(rate, voltage, np.concatenate(([0.0], np.cumsum(velocity))) / rate)
     true = (gain * pole) ** 2 / ((2.0 * np.pi * known.layout.frequency) ** 2 + pole**2)
     banded = np.bincount(known.layout.band, true, known.layout.count) / known.layout.lines
-    slow = known.layout.edges()[1:] < 300.0  # above, a sample's hold shows
+    slow = known.layout.edges()[1:] < 300.0  # above, the hold is visible
     assert known.floor.response[slow] == pytest.approx(banded[slow], rel=0.1)
 
 
 @pytest.fixture(scope="module")
 def hanging() -> AxisData:
-    """A joint that hangs and follows a slow path: its current shows every reversal of the friction, its motion is smooth."""
+    """A hanging joint on a slow path: its current shows every reversal of the friction, its motion is smooth."""
     rate, draws = 100.0, np.random.default_rng(3)
     time = np.arange(0.0, 60.0, 1.0 / rate)
     position = np.sum([0.3 * np.sin(2 * np.pi * f * time + draws.uniform(0.0, 6.0)) for f in (0.1, 0.23, 0.41, 0.67)], axis=0)
@@ -79,7 +79,7 @@ def hanging() -> AxisData:
 
 
 def test_the_response_to_a_force_is_that_of_a_rigid_axis_where_the_motion_is_silent(hanging: AxisData) -> None:
-    """A controller keeps the motion smooth: output over input is next to nothing there, and says nothing about a force."""
+    """A controller keeps the motion smooth: output over input is nearly zero there, and is not the response to a force."""
     layout = hanging.layout
     force, moved = (hanging.fitted.spectrum(signal) for signal in (hanging.voltage[:-1], hanging.velocity))
     ratio = layout.power(moved) / layout.power(force)
@@ -90,7 +90,7 @@ def test_the_response_to_a_force_is_that_of_a_rigid_axis_where_the_motion_is_sil
 
 
 def test_no_model_makes_its_own_error_cheap(hanging: AxisData) -> None:
-    """A model that hardly answers is not better than one which follows the motion: what the joint is made of is found, at its size."""
+    """A model that hardly moves is not better than one that follows the motion: the effects of the joint are found, with their sizes."""
     found = diagnose_prepared(hanging)
     assert set(found.effects) == {"gravity", "coulomb_friction"}
     assert found.final is not None
@@ -116,7 +116,7 @@ def test_a_fit_never_ends_worse_than_it_starts(data: AxisData, effects: tuple[tu
 
 
 def test_a_fit_stays_at_the_answer(data: AxisData) -> None:
-    """Begun where it ended it goes nowhere else."""
+    """Started at its result, it does not move."""
     base = fit_base(data)
     once = fit(data, base.model.with_effect("coulomb_friction", (0.2,)))
     again = finish(data, once.model)

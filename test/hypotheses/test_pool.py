@@ -1,4 +1,4 @@
-"""The search over sets of effects: what is tried, what is kept, and when it ends."""
+"""The search over sets of effects: tested and kept sets, and its end."""
 
 from __future__ import annotations
 
@@ -42,21 +42,21 @@ def both() -> tuple[Pool, list[frozenset[str]]]:
 
 
 def test_both_effects_are_found(both: tuple[Pool, list[frozenset[str]]]) -> None:
-    """One after the other or at once; what is left is the floor."""
+    """One after the other or at once; the residual error is at the floor."""
     pool, _ = both
     assert pool.best.effects == {"coulomb_friction", "cogging"}
     assert pool.best.fit.excess < AT_FLOOR
 
 
 def test_no_set_is_tried_twice(both: tuple[Pool, list[frozenset[str]]]) -> None:
-    """What is said before is what is fitted after, once."""
+    """Each announced set is fitted afterwards, once."""
     pool, tried = both
     assert len(set(tried)) == len(tried)
     assert {*tried, frozenset()} >= set(pool.nodes)
 
 
 def test_the_same_data_give_the_same_search(both: tuple[Pool, list[frozenset[str]]]) -> None:
-    """To the last bit."""
+    """Equal bit for bit."""
     pool, tried = both
     again, same = searched(data_of("coulomb_friction+cogging"))
     assert same == tried
@@ -65,21 +65,21 @@ def test_the_same_data_give_the_same_search(both: tuple[Pool, list[frozenset[str
 
 
 def test_an_axis_at_the_floor_asks_for_no_fit() -> None:
-    """Nothing is missing, so nothing is tried."""
+    """Nothing is missing, so no set is tested."""
     pool, tried = searched(data_of(""))
     assert tried == []
     assert pool.best.effects == frozenset()
 
 
 def test_no_set_has_more_effects_than_were_asked_for() -> None:
-    """Nor does it try more than one then."""
+    """At most one set is tested then."""
     pool, tried = searched(data_of("coulomb_friction+cogging"), most=1)
     assert all(len(effects) == 1 for effects in tried)
     assert len(pool.best.effects) <= 1
 
 
 def test_every_set_has_what_is_given() -> None:
-    """And the effect that is missing beside it."""
+    """And the second missing effect."""
     data = data_of("coulomb_friction+cogging")
     pool = Pool(data, STANDARD, frozenset({"cogging"}))
     base = fit_base(data)
@@ -104,7 +104,7 @@ def test_what_is_of_no_use_is_left_out_again() -> None:
 
 
 def test_a_search_that_is_late_ends_with_the_best_so_far() -> None:
-    """After the fit in hand, and the answer says so."""
+    """It ends after the current fit, and the answer says so."""
     ticks = iter(range(10_000))
     ladder = refine(data_of("coulomb_friction+cogging"), effort=Effort(budget=3.0, clock=lambda: float(next(ticks))))
     assert ladder.stopped
@@ -112,7 +112,7 @@ def test_a_search_that_is_late_ends_with_the_best_so_far() -> None:
 
 
 def test_a_refused_set_is_never_best(both: tuple[Pool, list[frozenset[str]]]) -> None:
-    """Whatever it leaves."""
+    """With any residual error."""
     pool, _ = both
     best = pool.best
     try:
@@ -123,7 +123,7 @@ def test_a_refused_set_is_never_best(both: tuple[Pool, list[frozenset[str]]]) ->
 
 
 def test_moves_hold_no_law_twice() -> None:
-    """Neither two of a family, nor a sum beside one of its parts."""
+    """No set has two effects of a family, or a sum with one of its parts."""
     data = data_of("coulomb_friction+cogging")
     base = fit_base(data)
     assert is_twice(STANDARD, ["asymmetric_friction", "constant_load"])
@@ -133,7 +133,7 @@ def test_moves_hold_no_law_twice() -> None:
 
 
 def test_the_better_of_two_fits_gains_and_a_fit_gains_nothing_over_itself(both: tuple[Pool, list[frozenset[str]]]) -> None:
-    """Paired over the held-out windows, with its chance."""
+    """Paired over the held-out windows, with its probability."""
     pool, _ = both
     rigid, best = pool.nodes[frozenset()], pool.best
     assert gain(best.fit, rigid.fit).is_sure and not gain(rigid.fit, best.fit).is_sure
@@ -145,7 +145,7 @@ def test_the_better_of_two_fits_gains_and_a_fit_gains_nothing_over_itself(both: 
 
 
 def test_a_quick_fit_never_takes_the_place_of_one_on_all_data() -> None:
-    """A better quick fit of a known set is fitted on all data, too; when the time is up, what was known stays, and goes on leading."""
+    """A better screening fit of a known set gets a full fit, too; if the time is up, the known fit is kept, and stays first."""
     pool, effects = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD), frozenset({"coulomb_friction"})
     base = pool.add_first(fit_base(pool.data))
     whole = with_one_more(pool.data, STANDARD, base.fit, base.fit, "coulomb_friction")
@@ -160,15 +160,15 @@ def test_a_quick_fit_never_takes_the_place_of_one_on_all_data() -> None:
 
 
 def test_the_first_set_stays_as_it_was_given() -> None:
-    """Answers are shown beside its error, so no other fit takes its place."""
+    """Answers are compared with its error, so no other fit replaces it."""
     pool = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD)
     first = pool.add_first(fit_base(pool.data))
-    first.fit = replace(first.fit, model=replace(first.fit.model, gain=2.0 * first.fit.model.gain))  # of which a refit would be better
+    first.fit = replace(first.fit, model=replace(first.fit.model, gain=2.0 * first.fit.model.gain))  # a refit of it would be better
     assert pool.with_screening_fit(frozenset(), lambda: [first.screening.model]) is first and pool.nodes[frozenset()] is first
 
 
 def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> None:
-    """A wave whose period was fitted to one turn gives way to gravity, its special case, which has one parameter less."""
+    """A wave with a period of one turn is replaced by gravity, its special case with one parameter less."""
     machine = Machine.from_file("hanging.yaml")
     axis = AxisExcitation(rms=1.5, low=0.1, high=5.0, limit=8.0, centring=0.0, travel_min=-9.0, travel_max=9.0, brake=0.5, seed=3)
     made = drive(machine, ExcitationSettings(lockstep=True, speed=0.0, rate=1000.0, block=50, unit="rad", axes={"x": axis}), 30.0)
@@ -187,7 +187,7 @@ def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> 
 
 
 def test_no_gap_is_looked_for_where_friction_explains_most_of_the_error() -> None:
-    """Though noise on the input leaves more than the floor: the answer is the friction, and no set with a gap is tried."""
+    """Noise on the input keeps the error above the floor: the answer is still the friction, and no set with a gap is tested."""
     voltage, position = recorded("coulomb_friction", seconds=20.0).axis("x")
     noisy = voltage + 0.05 * float(np.std(voltage)) * np.random.default_rng(4).normal(size=voltage.size)
     tried: list[frozenset[str]] = []
@@ -198,7 +198,7 @@ def test_no_gap_is_looked_for_where_friction_explains_most_of_the_error() -> Non
 
 
 def test_a_quick_fit_tells_how_near_a_set_comes_by_the_first_set() -> None:
-    """A set that is worse than the first, as every search has some, lets no more quick fits through."""
+    """A set that is worse than the first does not lead to more screening fits."""
     pool = Pool(data_of("coulomb_friction", seconds=5.0), STANDARD)
     base = pool.add_first(fit_base(pool.data))
     near = pool._full_fit_limit()
@@ -209,7 +209,7 @@ def test_a_quick_fit_tells_how_near_a_set_comes_by_the_first_set() -> None:
 
 @pytest.mark.parametrize("refused_at_first", [True, False])
 def test_all_data_tell_whether_a_simpler_set_is_refused(refused_at_first: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A set is not kept because a quick fit of a simpler one is refused, and does not give way to one that all data refuse."""
+    """A refused screening fit of a simpler set does not keep a set, and a set is not replaced by one that is refused with all data."""
     data, simple, crowded = data_of("coulomb_friction"), frozenset({"coulomb_friction"}), frozenset({"coulomb_friction", "constant_load"})
     pool = Pool(data, STANDARD)
     pool.add_first(fit_base(data))

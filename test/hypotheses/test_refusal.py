@@ -1,4 +1,4 @@
-"""What explains nothing, whatever it leaves."""
+"""Refused fits, with any residual error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def ending(data: AxisData, rate: float) -> GreyboxFit:
 
 @pytest.mark.parametrize(("side", "refused"), [("low", True), ("high", True), ("middle", False)])
 def test_a_size_with_a_sign_has_two_bounds(side: str, refused: bool, data: AxisData) -> None:
-    """A gain that falls as fast as is looked for tells as little as one that rises so."""
+    """A gain that falls at its bound is as undetermined as one that rises at it."""
     item = STANDARD["gain_drift"].on(data.similar)[0]
     rate = {"low": item.low, "high": item.high, "middle": -0.01}[side]
     assert at_bound(item, rate) is refused

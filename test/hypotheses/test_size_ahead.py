@@ -1,4 +1,4 @@
-"""How much a prediction one sample ahead explains: beyond the noise, as everywhere."""
+"""The fraction that one-step prediction explains, above the noise."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NOISE = 1e-3  # m/s
 
 
 def ahead(error: float) -> GreyboxFit:
-    """A fit that leaves so much one sample ahead, m/s."""
+    """A fit with this one-step error, m/s."""
     nothing = np.empty(0)
     fit = GreyboxFit(
         model=AxisModel(0.1, 1e-3, 250.0),
@@ -40,21 +40,21 @@ def ahead(error: float) -> GreyboxFit:
 
 
 def test_what_is_gone_counts_over_what_is_left_beyond_the_noise() -> None:
-    """Of two and one times the noise's own power beyond it, one is gone and one is left."""
+    """From two times the noise power above the noise to one time: half is explained."""
     assert size_ahead(NOISE * 3.0**0.5, NOISE * 2.0**0.5, NOISE) == pytest.approx(1.0)
     assert size_ahead(NOISE, NOISE * 2.0**0.5, NOISE) == pytest.approx(-1.0)
 
 
 @pytest.mark.parametrize(("bar", "without"), [(1.9, 9.0), (9.0, 1.9)])
 def test_a_gap_wins_by_what_it_explains_beyond_the_noise(bar: float, without: float) -> None:
-    """Against the better of the two that know no gap; what is named must explain so much, here as in a simulation."""
+    """Compared with the better of the two without a gap; a named effect must explain this fraction, as in a simulation."""
     last = (1.0 + (1.9**2 - 1.0) / (1.0 + SIZE)) ** 0.5
     assert OneStepResult((("backlash", ahead(0.99 * last * NOISE)),), bar * NOISE, without * NOISE).is_accepted
     assert not OneStepResult((("backlash", ahead(1.01 * last * NOISE)),), bar * NOISE, without * NOISE).is_accepted
 
 
 def test_a_gap_does_not_win_by_what_nobody_can_tell() -> None:
-    """At the noise the least gain is many times what is left beyond it."""
+    """At the noise, the smallest gain is many times the residual above it."""
     best = ahead(1.0001 * NOISE)
     little = OneStepResult((("backlash", best),), 9.0 * NOISE, 1.02 * best.held_out_error)
     assert little.size > SIZE and not little.is_accepted

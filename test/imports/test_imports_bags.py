@@ -1,4 +1,4 @@
-"""Samples of two streams are paired by number or stamp, whatever happened to them on the way."""
+"""Samples of two streams are paired by number or stamp, in spite of any transmission fault."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def of(path: Path, messages: list[tuple[str, Block]]) -> Recording:
 
 
 def true(recording: Recording) -> bool:
-    """Samples are those that the test wrote for their numbers."""
+    """Assert that samples have the values that the test wrote for their numbers."""
     expected = recording.seq[:, None] + np.array([0.0, 0.25])[: len(recording.axes)]
     return np.array_equal(recording.voltage, expected) and np.array_equal(recording.position, 1e-3 * expected)
 
@@ -48,7 +48,7 @@ def test_a_bag_gives_back_what_was_saved(tmp_path: Path, ending: str) -> None:
 
 
 def test_units_travel_with_a_bag(tmp_path: Path) -> None:
-    """A and rad are carried by the folder; a bare file has no place for them and says so."""
+    """A folder stores A and rad; a single file cannot store them, and an error says so."""
     recording = a_recording(100, ("a",), input_unit="A", output_unit="rad")
     save(recording, tmp_path / "out")
     assert_same(load(tmp_path / "out"), recording)
@@ -67,7 +67,7 @@ def test_blocks_never_reach_over_a_gap() -> None:
 
 
 def test_lost_blocks_are_gaps(tmp_path: Path) -> None:
-    """A block lost from one stream or the other leaves a gap; the rest is paired rightly, and it is noted."""
+    """A lost block of either stream leaves a gap; the rest is paired correctly, with a note."""
     messages = both(range(0, 2000, 20))
     del messages[21], messages[81]
     recording = of(tmp_path, messages)
@@ -76,7 +76,7 @@ def test_lost_blocks_are_gaps(tmp_path: Path) -> None:
 
 
 def test_late_and_repeated_blocks_are_put_right(tmp_path: Path) -> None:
-    """Blocks out of order are sorted and repeated ones dropped, up to half a second late."""
+    """Blocks up to half a second late are sorted, and repeated ones dropped."""
     messages = both(range(0, 4000, 20))
     messages.insert(130, messages.pop(60))
     messages.insert(40, messages[33])
@@ -87,7 +87,7 @@ def test_late_and_repeated_blocks_are_put_right(tmp_path: Path) -> None:
 
 
 def test_a_very_late_block_is_no_restart(tmp_path: Path) -> None:
-    """A single block that comes seconds late takes its place; nothing else is thought of it."""
+    """A single block that is seconds late is put in its place, without further consequences."""
     messages = both(range(0, 20_000, 20))
     messages.append(messages.pop(400))
     messages.insert(1500, messages.pop(700))
@@ -97,7 +97,7 @@ def test_a_very_late_block_is_no_restart(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("first", [0, 3000])
 def test_a_restart_of_the_source_is_a_gap(tmp_path: Path, first: int) -> None:
-    """After a restart counters begin again: the parts follow each other and are never mixed."""
+    """After a restart counters begin again: the parts are kept in sequence and never mixed."""
     recording = of(tmp_path, both(range(first, first + 4000, 20)) + both(range(0, 6000, 20)) + both(range(0, 2000, 20)))
     assert len(recording) == 12_000 and len(recording.runs()) == 3
     assert recording.sampling_rate == 2000.0 and bool(np.all(np.diff(recording.time) > 0))
@@ -106,7 +106,7 @@ def test_a_restart_of_the_source_is_a_gap(tmp_path: Path, first: int) -> None:
 
 
 def test_a_restart_of_one_stream_alone_pairs_nothing_wrongly(tmp_path: Path) -> None:
-    """When only one counter began again the samples after it have no partner that is known."""
+    """If only one counter restarts, the following samples cannot be paired."""
     voltage = [("voltage", numbered(first)) for first in range(0, 8000, 20)]
     position = [("position", numbered(first % 4000, scale=1e-3)) for first in range(0, 8000, 20)]
     recording = of(tmp_path, [message for pair in zip(voltage, position, strict=True) for message in pair])
@@ -134,14 +134,14 @@ def test_a_jump_of_the_clock_moves_no_sample(tmp_path: Path) -> None:
 
 
 def test_unequal_rates_are_refused(tmp_path: Path) -> None:
-    """Counters of streams at different rates mean different instants: one line with both rates."""
+    """Counters at different rates belong to different instants: one line with both rates."""
     slow = [("voltage", block(np.ones((20, 2)), first, rate=1000.0)) for first in range(0, 2000, 20)]
     with pytest.raises(BadRecording, match="voltage runs at 1000 Hz and position at 2000 Hz"):
         of(tmp_path, slow + both(range(0, 2000, 20))[1::2])
 
 
 def test_counters_without_a_common_number_are_refused(tmp_path: Path) -> None:
-    """Nothing to pair: the line says which numbers each stream has."""
+    """Nothing to pair: the error gives the numbers of each stream."""
     with pytest.raises(BadRecording, match="voltage has 0 to 999, position 5000 to 5999"):
         of(tmp_path, both(range(0, 1000, 20))[0::2] + both(range(5000, 6000, 20))[1::2])
 
@@ -161,7 +161,7 @@ def test_axes_that_only_one_stream_has_are_left_out(tmp_path: Path) -> None:
 
 
 def test_wrong_columns_are_left_out_and_said(tmp_path: Path) -> None:
-    """Messages whose columns are not seq,time,... or change on the way do no harm."""
+    """Messages with columns other than seq,time,..., or with changing columns, are skipped."""
     messages = both(range(0, 2000, 20))
     with BagWriter(tmp_path / "bag") as writer:
         for count, (kind, content) in enumerate(messages):
@@ -209,7 +209,7 @@ def joint_bag(path: Path, stamps: list[int], names: tuple[str, ...] = ("x", "y")
 
 
 def test_joint_states_are_found_and_their_effort_is_the_input(tmp_path: Path) -> None:
-    """A robot's bag without our topics: joints are axes, effort is the input, and both is said."""
+    """A robot's bag without our topics: joints are axes, effort is the input, with notes on both."""
     position = joint_bag(tmp_path / "bag", [10**18 + i * 500_000 for i in range(1500)], ("shoulder", "elbow"))
     recording = load(tmp_path / "bag")
     assert recording.axes == ("shoulder", "elbow") and recording.sampling_rate == 2000.0 and recording.input_unit == "effort"
@@ -235,7 +235,7 @@ def test_lost_joint_states_are_gaps_and_repeated_ones_dropped(tmp_path: Path) ->
 
 
 def test_wild_stamps_are_numbered_as_they_came(tmp_path: Path) -> None:
-    """Stamps that jitter by most of a period but of which none is lost give no false gaps; it is noted."""
+    """Stamps with jitter of nearly a period, without lost samples, give no false gaps, but a note."""
     random = np.random.default_rng(8)
     joint_bag(tmp_path / "bag", [int(10**18 + i * 500_000 + random.integers(0, 490_000)) for i in range(3000)])
     recording = load(tmp_path / "bag")
@@ -244,16 +244,16 @@ def test_wild_stamps_are_numbered_as_they_came(tmp_path: Path) -> None:
 
 
 def test_without_stamps_the_time_of_recording_counts(tmp_path: Path) -> None:
-    """All header stamps zero: the log time is used, and it is said."""
+    """All header stamps are zero: the log time is used, with a note."""
     joint_bag(tmp_path / "bag", [0] * 1000, log=5_000_000_000)
     recording = load(tmp_path / "bag")
     assert recording.sampling_rate == 2000.0 and recording.time[0] == 5.0 and any("time of recording" in note for note in recording.notes)
 
 
 def robot_bag(path: Path, samples: int = 4000) -> tuple[FloatArray, FloatArray]:
-    """As ros2_control leaves it: names in any order, a gripper without effort, effort of the cycle before, and our reference as blocks.
+    """As by ros2_control: names in any order, a gripper without effort, effort of the previous cycle, and our reference as blocks.
 
-    Gives what was commanded, and where the two joints were, (samples, 2) each.
+    Returns commands and positions of the two joints, (samples, 2) each.
     """
     random = np.random.default_rng(11)
     effort, position = random.normal(size=(samples, 2)), random.normal(size=(samples, 2))
@@ -275,7 +275,7 @@ def robot_bag(path: Path, samples: int = 4000) -> tuple[FloatArray, FloatArray]:
 
 
 def test_a_robots_joints_become_axes_with_their_effort_and_the_reference(tmp_path: Path) -> None:
-    """Two of three joints, under names of ours, in our order; each sample with the effort that acted from then on, and its reference."""
+    """Two of three joints, with our names and order; each sample with the effort that acts from then on, and its reference."""
     effort, position = robot_bag(tmp_path / "bag")
     units = {"input": "N m", "output": "rad"}
     found = load(tmp_path / "bag", effort_as_voltage=True, joints=("y=joint-2", "x=pan"), effort_lag=1, units=units)
@@ -289,7 +289,7 @@ def test_a_robots_joints_become_axes_with_their_effort_and_the_reference(tmp_pat
     one = load(tmp_path / "bag", effort_as_voltage=True, joints=("x=pan",), effort_lag=0, axes=("x",))
     np.testing.assert_array_equal(one.voltage[1:, 0], effort[:-1, 0])
     every = load(tmp_path / "bag")
-    assert set(every.axes) == {"pan", "joint-2"} and every.reference is None  # under their own names nobody knows whose the reference is
+    assert set(every.axes) == {"pan", "joint-2"} and every.reference is None  # with their own names the reference cannot be assigned
     assert any("--joint" in note for note in every.notes) and any("gripper" in note for note in every.notes)
 
 
@@ -298,14 +298,14 @@ def test_a_robots_joints_become_axes_with_their_effort_and_the_reference(tmp_pat
     [(("x",), "axis=joint"), (("x=pan", "x=joint-2"), "once"), (("x=pan", "y=pan"), "a joint of its own"), (("x=elbow",), "no joint elbow among")],
 )
 def test_a_wrong_joint_is_one_line(tmp_path: Path, joints: tuple[str, ...], words: str) -> None:
-    """No pair, an axis or a joint twice, a joint that is not there."""
+    """No pair, an axis or a joint twice, an unknown joint."""
     robot_bag(tmp_path / "bag", 400)
     with pytest.raises(XySysidError, match=words):
         load(tmp_path / "bag", effort_as_voltage=True, joints=joints)
 
 
 def test_replay_of_a_robots_bag_takes_the_nodes_own_parameters(tmp_path: Path) -> None:
-    """The parameter file of the live identifier is enough: topic, joints, lag and units stand in it; or they are said as for other commands."""
+    """The parameter file of the live identifier contains topic, joints, lag and units; they can also be given as options."""
     robot_bag(tmp_path / "bag")
     parameters = tmp_path / "live.yaml"
     live = {"source": "joint_state", "joint_topic": "/joint_states", "joints": ["y=joint-2", "x=pan"], "effort_as_voltage": True, "effort_lag": 1}
@@ -323,7 +323,7 @@ def test_replay_of_a_robots_bag_takes_the_nodes_own_parameters(tmp_path: Path) -
 
 @pytest.mark.parametrize("name", ["ros2_control.yaml", "real.yaml"])
 def test_a_run_file_to_copy_fixes_no_orders(name: str) -> None:
-    """They come from the data of the machine, which the template does not know."""
+    """They come from the data of the machine, not from the template."""
     nodes = yaml.safe_load((ROOT / "config" / name).read_text(encoding="utf-8"))["nodes"]
     (own,) = [node.get("parameters") or {} for node in nodes if node["executable"] == "identifier"]
     assert not {"numerator_order", "denominator_order"} & own.keys()
@@ -363,7 +363,7 @@ def test_a_run_file_says_where_its_identifier_listens(tmp_path: Path) -> None:
 
 
 def test_a_run_file_of_two_machines_is_refused_in_one_line(tmp_path: Path) -> None:
-    """Whose parameters are meant is not guessed."""
+    """The choice between nodes is not guessed."""
     save(a_recording(400), tmp_path / "bag")
     two = [{"executable": "identifier", "name": name} for name in ("left", "right")]
     (tmp_path / "run.yaml").write_text(yaml.safe_dump({"nodes": two}))
@@ -371,7 +371,7 @@ def test_a_run_file_of_two_machines_is_refused_in_one_line(tmp_path: Path) -> No
 
 
 def test_a_diagnosis_of_a_bag_heeds_the_run_files_diagnoser(tmp_path: Path) -> None:
-    """Its tolerance stands in the story, as it would live."""
+    """Its tolerance is in the story, as in live operation."""
     save(a_recording(40_000), tmp_path / "bag")
     nodes = [{"executable": "identifier"}, {"executable": "diagnoser", "parameters": {"tolerance": 0.02}}]
     (tmp_path / "run.yaml").write_text(yaml.safe_dump({"nodes": nodes}))
@@ -380,7 +380,7 @@ def test_a_diagnosis_of_a_bag_heeds_the_run_files_diagnoser(tmp_path: Path) -> N
 
 
 def test_joint_states_are_numbered_in_a_replay_as_they_were_live(tmp_path: Path) -> None:
-    """Cycles that begin late and catch up, and lost ones: the counter decides one by one, with the same numbers and instants as in a node."""
+    """Late cycles that catch up, and lost ones: samples are numbered one by one, with the same numbers and times as in a node."""
     random = np.random.default_rng(3)
     late = np.where(random.random(3000) < 0.02, random.uniform(1.0, 5.0, 3000), 0.0)
     begins = np.maximum.accumulate(np.arange(3000) + late)
@@ -420,7 +420,7 @@ def test_joint_states_pair_with_voltage_blocks_by_stamp(tmp_path: Path) -> None:
 
 
 def test_joint_states_without_an_input_are_one_line(tmp_path: Path) -> None:
-    """No voltage topic and no effort, or one that is zero: the line says what is missing."""
+    """No voltage topic and no effort, or zero effort: the error names the missing input."""
     joint_bag(tmp_path / "none", [i * 500_000 for i in range(1, 100)], effort=False)
     with pytest.raises(BadRecording, match="fewer than 2 samples of effort"):
         load(tmp_path / "none")
@@ -432,7 +432,7 @@ def test_joint_states_without_an_input_are_one_line(tmp_path: Path) -> None:
 
 
 def test_several_joint_topics_need_a_choice(tmp_path: Path) -> None:
-    """Which one is not guessed; the line names them and the option."""
+    """The choice is not guessed; the error names them and the option."""
     with BagWriter(tmp_path / "bag") as writer:
         for i in range(1, 100):
             for arm in ("left", "right"):

@@ -1,4 +1,4 @@
-"""Files made to harm, and files that are partly damaged: one clear line at once, or the rest is read and what is not is said."""
+"""Malicious and partly damaged files: one clear line at once, or the rest is read with notes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from xy_sysid.errors import BadRecording, XySysidError
 from xy_sysid.imports import load
 from xy_sysid.samples.block import Block, pack
 
-QUICK = 2.0  # s, for a refusal
+QUICK = 2.0  # s, limit for an error
 
 
 def error_of(path: Path, **options: Any) -> str:
@@ -38,7 +38,7 @@ def error_of(path: Path, **options: Any) -> str:
 
 @contextlib.contextmanager
 def within(seconds: float) -> Iterator[None]:
-    """Fails when the body takes longer."""
+    """Fails if the body takes longer."""
     begun = time.monotonic()
     yield
     assert time.monotonic() - begun < allowed(seconds)
@@ -46,14 +46,14 @@ def within(seconds: float) -> Iterator[None]:
 
 @pytest.fixture
 def small_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine on which 40 MB may be loaded at once."""
+    """Context in which at most 40 MB may be loaded."""
     whole = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     monkeypatch.setattr("xy_sysid.imports.limits.SHARE", 4 * 40e6 / whole)
 
 
 @pytest.mark.usefixtures("small_memory")
 def test_arrays_that_swell_are_refused_before_they_are_unpacked(tmp_path: Path) -> None:
-    """npz and mat of some kB that say, or hide, that they become 400 MB: refused, and the memory of this process does not grow."""
+    """npz and mat of a few kB that decompress to 400 MB, declared or hidden: refused, without growth of this process's memory."""
     big = np.zeros(50_000_000)
     np.savez_compressed(tmp_path / "a.npz", t=T, u=U, y=Y, other=big)
     scipy.io.savemat(tmp_path / "a.mat", {"t": T, "u": U, "y": Y, "other": big}, do_compression=True)
@@ -61,7 +61,7 @@ def test_arrays_that_swell_are_refused_before_they_are_unpacked(tmp_path: Path) 
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for name in ("a.npz", "a.mat"):
         assert (tmp_path / name).stat().st_size < 1e6
-        with within(QUICK + 3):  # the reader of .mat is a process of its own
+        with within(QUICK + 3):  # the reader of .mat is a separate process
             assert "0.4 GB, and 0.04 GB may be loaded" in error_of(tmp_path / name)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000  # kB
 
@@ -81,7 +81,7 @@ def test_an_array_that_claims_more_than_it_holds_is_refused(tmp_path: Path) -> N
 
 
 def test_a_reader_that_crashes_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """scipy's reader can crash the process that it runs in: it is not this one."""
+    """scipy's reader may crash its process, which is therefore not this one."""
     scipy.io.savemat(tmp_path / "a.mat", {"t": T, "u": U, "y": Y})
     child = tmp_path / "child.py"
     child.write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
@@ -90,7 +90,7 @@ def test_a_reader_that_crashes_is_said(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_wrong_bytes_in_a_mat_file_never_end_in_a_traceback(tmp_path: Path) -> None:
-    """Some numbers or one line, whatever byte is wrong."""
+    """Some numbers or one line, for any wrong byte."""
     scipy.io.savemat(tmp_path / "a.mat", {"a": {"t": T, "u": U, "y": Y, "names": np.array(["x", "yy"], object)}})
     whole = (tmp_path / "a.mat").read_bytes()
     random = np.random.default_rng(1)
@@ -111,7 +111,7 @@ def chunk(packed: bytes, becomes: int) -> bytes:
 
 @pytest.mark.parametrize(("becomes", "says"), [(1000, "it becomes more than 1000 bytes"), (1 << 40, "it says it becomes 1.1e+03 GB")])
 def test_a_chunk_that_swells_is_left_out(tmp_path: Path, becomes: int, says: str) -> None:
-    """200 MB of zeros in 6 kB, declared small or huge: the other chunks are read, and it is said."""
+    """200 MB of zeros in 6 kB, declared small or huge: the other chunks are read, with a note."""
     bag = tmp_path / "bag"
     in_chunks(bag, "mcap", 4000)
     file = the_file(bag)
@@ -126,7 +126,7 @@ def test_a_chunk_that_swells_is_left_out(tmp_path: Path, becomes: int, says: str
 
 
 def test_a_compressed_file_that_swells_is_refused(tmp_path: Path) -> None:
-    """A bag compressed as a whole: what becomes 200 times its size is no recording, and does not fill the disk."""
+    """A fully compressed bag: more than 200 times its size is not a recording, and does not fill the disk."""
     bag = tmp_path / "bag"
     bag.mkdir()
     (bag / "a.db3.zstd").write_bytes(zstd.compress(bytes(400_000_000)))
@@ -139,7 +139,7 @@ def test_a_compressed_file_that_swells_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
 def test_one_bad_compressed_message_is_left_out(tmp_path: Path, storage: str) -> None:
-    """Messages compressed one by one are read from both storages; a damaged one costs its samples, and is counted."""
+    """Individually compressed messages are read from both storages; a damaged one loses its samples, and is counted."""
     path = tmp_path / "bag"
     with rosbags_writer(path, storage) as writer:
         connections = {name: writer.add_connection(f"/xy/{name}", ARRAY_TYPE, typestore=STORE) for name in ("voltage", "position")}
@@ -218,7 +218,7 @@ def changed(content: Block, **values: Any) -> Block:
 
 
 def test_numbers_that_are_none_cost_their_samples_only(tmp_path: Path) -> None:
-    """NaN in seq, 1e300 in a position: these samples are left out and counted, the rest is whole."""
+    """NaN in seq, 1e300 in a position: these samples are left out and counted, the rest is complete."""
     messages = both(range(0, 2000, 20))
     seq = messages[10][1].seq.copy()
     seq[3] = np.nan
@@ -232,7 +232,7 @@ def test_numbers_that_are_none_cost_their_samples_only(tmp_path: Path) -> None:
 
 
 def test_an_axis_without_numbers_is_left_out(tmp_path: Path) -> None:
-    """All NaN on y: x is read whole, and it is said; in a bag as in a table."""
+    """All NaN on y: x is read completely, with a note; in a bag as in a table."""
     hollow = [
         (kind, changed(content, values=np.column_stack((content.values[:, 0], np.full(20, np.nan)))) if kind == "position" else content)
         for kind, content in both(range(0, 2000, 20))
@@ -248,7 +248,7 @@ def test_an_axis_without_numbers_is_left_out(tmp_path: Path) -> None:
 
 
 def test_axes_of_one_name_are_left_out(tmp_path: Path) -> None:
-    """Nobody knows which x is meant; y is read. Of blocks and of joint states."""
+    """x is ambiguous; y is read. For blocks and for joint states."""
     messages = [(kind, Block(("x", "y", "x"), c.seq, c.time, np.column_stack((c.values, 7 * c.values[:, 0])))) for kind, c in both(range(0, 400, 20))]
     recording = load(a_bag(tmp_path / "bag", messages))
     assert recording.axes == ("y",) and any("has x twice" in note for note in recording.notes)
@@ -264,7 +264,7 @@ def test_axes_of_one_name_are_left_out(tmp_path: Path) -> None:
 
 
 def test_one_message_with_other_columns_does_not_decide(tmp_path: Path) -> None:
-    """Were it the first: what most samples have is read, and the rest is said."""
+    """Even as the first block: the columns of most samples are read, with a note about the rest."""
     messages = both(range(0, 2000, 20))
     messages[0] = ("voltage", changed(messages[0][1], axes=("y", "x")))
     recording = load(a_bag(tmp_path / "bag", messages))
@@ -291,7 +291,7 @@ def test_numbers_beyond_any_unit_are_refused(tmp_path: Path) -> None:
 
 
 def a_slip(path: Path, kinds: tuple[str, ...], first: int = 1000, size: int = 1) -> Path:
-    """2000 samples; the counter of ``kinds`` slips at sample ``first``, while its time goes on."""
+    """2000 samples; the counter of ``kinds`` slips at sample ``first``, while its time continues."""
     messages = []
     for kind, content in both(range(0, 2000, 20)):
         slipped = kind in kinds and content.seq[0] >= first
@@ -300,7 +300,7 @@ def a_slip(path: Path, kinds: tuple[str, ...], first: int = 1000, size: int = 1)
 
 
 def test_a_counter_that_slips_is_noticed_with_the_place(tmp_path: Path) -> None:
-    """By one in the second half of one stream: what would be paired wrongly is left out; in both it is only said."""
+    """By one in the second half of one stream: samples that would be paired wrongly are left out; in both streams there is only a note."""
     recording = load(a_slip(tmp_path / "one", ("voltage",), first=1200))
     assert_true_numbers(recording)
     assert len(recording) == 1200 and recording.seq[-1] == 1199
@@ -316,7 +316,7 @@ def test_a_counter_that_slips_is_noticed_with_the_place(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kinds", [("voltage",), ("position",), ("voltage", "position")])
 def test_a_clock_that_jumps_is_noticed_with_the_place(tmp_path: Path, kinds: tuple[str, ...]) -> None:
-    """By 50 ms in one or both streams: paired by number all the same, the rate is right, and the place is said."""
+    """By 50 ms in one or both streams: samples are still paired by number, the rate is right, and a note gives the place."""
     messages = []
     for kind, content in both(range(0, 2000, 20)):
         jumped = kind in kinds and content.seq[0] >= 600
@@ -348,7 +348,7 @@ def test_a_jump_of_time_in_a_table_with_a_counter_is_noticed(tmp_path: Path) -> 
     ],
 )
 def test_a_csv_that_ends_inside_a_number_says_so(tmp_path: Path, end: str, kept: int, says: str) -> None:
-    """The last row is left out if it is not whole; if nobody can know, that is said."""
+    """An incomplete last row is left out; if that cannot be determined, a note says so."""
     rows = [f"{k / 100:.3f},{k % 7:.3f},{k % 5:.3f}" for k in range(30)]
     (tmp_path / "a.csv").write_text("\n".join(["time,u,y", *rows, end]))
     recording = load(tmp_path / "a.csv")

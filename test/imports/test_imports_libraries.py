@@ -1,4 +1,4 @@
-"""Files that a library of others reads: written here by the same library, where it writes."""
+"""File formats of external libraries, written here by the same library if it can write."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FAST = np.repeat(U, 2)  # the input, at twice the rate of the output
 
 
 def as_mat73(path: Path) -> Path:
-    """As MATLAB lays it out: arrays turned, text as numbers, a struct as a group, an array of structs as references."""
+    """In MATLAB's layout: transposed arrays, text as numbers, a struct as a group, an array of structs as references."""
     h5py = pytest.importorskip("h5py")
 
     def stored(group: Any, name: str, values: Any) -> Any:
@@ -44,7 +44,7 @@ def as_mat73(path: Path) -> Path:
 
 
 def as_mf4(path: Path) -> Path:
-    """Two groups, each with its own time."""
+    """Two groups with separate times."""
     asammdf = pytest.importorskip("asammdf")
     with asammdf.MDF(version="4.10") as file:
         file.append([asammdf.Signal(samples=FAST, timestamps=np.arange(2 * len(T)) / (2 * RATE), name="motor_voltage", unit="V")])
@@ -70,7 +70,7 @@ def as_tdms(path: Path) -> Path:
 
 
 def as_ulog(path: Path) -> Path:
-    """Two topics. pyulog writes only what it has read, so the first file is put together here, by the specification, and pyulog writes it again."""
+    """Two topics. pyulog only writes files that it has read, so the first file is built here by the specification, and pyulog rewrites it."""
     pyulog = pytest.importorskip("pyulog")
 
     def message(kind: str, body: bytes) -> bytes:
@@ -99,7 +99,7 @@ def as_ulog(path: Path) -> Path:
 
 
 def as_wpilog(path: Path) -> Path:
-    """Two entries with stamps of their own."""
+    """Two entries with separate stamps."""
     wpiutil, log = pytest.importorskip("wpiutil"), pytest.importorskip("wpiutil.log")
     writer = wpiutil.DataLogWriter(str(path / "a.wpilog"))
     voltage, angle = log.DoubleLogEntry(writer, "NT:/motor/voltage"), log.DoubleLogEntry(writer, "NT:/joint/angle")
@@ -134,7 +134,7 @@ def as_parquet(path: Path) -> Path:
     ],
 )
 def test_what_a_library_wrote_is_read(tmp_path: Path, make: Callable[[Path], Path], options: dict[str, Any]) -> None:
-    """Input, output, units and instants come back; channels of other rates are held to the output's clock, and it is said."""
+    """Input, output, units and times are recovered; channels of other rates are held to the output's clock, with a note."""
     found = load(make(tmp_path), **options)
     assert found.sampling_rate == pytest.approx(RATE, rel=1e-6) and (found.input_unit, found.output_unit) == ("V", "rad")
     assert np.allclose(found.position[:, 0], Y[: len(found)], atol=1e-9) and np.allclose(found.voltage[:, 0], U[: len(found)])
@@ -145,7 +145,7 @@ def test_what_a_library_wrote_is_read(tmp_path: Path, make: Callable[[Path], Pat
 
 @pytest.mark.parametrize("form", [form for form in FORMATS if form.extra], ids=lambda form: form.extra)
 def test_a_library_that_is_missing_is_one_line_that_names_the_extra(tmp_path: Path, form: Format, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What to install stands in the line, and exists in setup.py; damaged files end in one line, too."""
+    """The error names the extra to install, which exists in setup.py; damaged files also give one line."""
     ending, extra = form.endings[0], form.extra
     path = tmp_path / f"a{ending}"
     path.write_bytes(b"MATLAB 7.3 MAT-file" if extra == "mat73" else b"no such thing")

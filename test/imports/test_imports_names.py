@@ -1,4 +1,4 @@
-"""Any table: columns are understood in any spelling, or as the user says; what was guessed is said, what cannot be known is asked."""
+"""Any table: columns are recognised in any spelling, or as given by the user; notes name the guesses, and errors ask for unknown ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from xy_sysid.samples.recording import Recording
 
 
 def assert_the_axis(recording: Recording, axis: str = "x") -> None:
-    """It holds what was written, in SI."""
+    """Assert that the recording has the written data, in SI."""
     assert recording.axes == (axis,) and recording.sampling_rate == RATE
     np.testing.assert_allclose(recording.voltage[:, 0], U, rtol=1e-12)
     np.testing.assert_allclose(recording.position[:, 0], Y, rtol=1e-12, atol=1e-18)
@@ -41,7 +41,7 @@ def assert_the_axis(recording: Recording, axis: str = "x") -> None:
     ],
 )
 def test_headers_in_any_case_and_spelling(tmp_path: Path, time: str, voltage: str, position: str, axis: str) -> None:
-    """Capitals, blanks, signs, units at the end, other languages; a note says what was understood."""
+    """Capitals, blanks, signs, units at the end, other languages; a note gives the interpretation."""
     text = f"{time} {voltage} {position}"
     milli = "ms" in text, "mV" in text
     units = {"mm": 1e3, "MM": 1e3, "um": 1e6}
@@ -83,14 +83,14 @@ def test_headers_in_any_case_and_spelling(tmp_path: Path, time: str, voltage: st
     ],
 )
 def test_what_a_name_says(name: str, role: str, axis: str, unit: str) -> None:
-    """The role, the axis and the unit, where letters could mean several things."""
+    """Role, axis and unit of ambiguous letters."""
     found = meaning(*header(name))
     assert found is not None and (found.role, found.axis, found.unit) == (role, axis, unit)
 
 
 @pytest.mark.parametrize("name", ["position_error", "CH1", "temperature", "state", "supply voltage"])
 def test_names_that_say_nothing(name: str) -> None:
-    """They are no role."""
+    """They have no role."""
     assert meaning(*header(name)) is None
 
 
@@ -107,7 +107,7 @@ def test_columns_can_be_mapped_scaled_and_given_units(tmp_path: Path) -> None:
 
 
 def test_a_column_can_be_given_by_its_number_or_in_another_spelling(tmp_path: Path) -> None:
-    """1 is the first; case and signs do not matter; a name that is not there is said with those that are."""
+    """1 is the first; case and signs do not matter; an unknown name gives an error with the existing ones."""
     path = csv_of(tmp_path, {"A b": T, "ch 2": U, "ch 3": Y})
     assert_the_axis(load(path, columns={"time": "1", "input": "CH_2", "output": "#3"}))
     with pytest.raises(BadRecording, match="no column 'ch 4'; it has A b, ch 2, ch 3"):
@@ -125,14 +125,14 @@ def test_a_column_can_be_given_by_its_number_or_in_another_spelling(tmp_path: Pa
     ],
 )
 def test_wrong_options_of_reading_are_one_line(tmp_path: Path, options: dict[str, Any], says: str) -> None:
-    """What was given, what is allowed."""
+    """The given value, and the allowed ones."""
     with pytest.raises(BadInput) as caught:
         load(csv_of(tmp_path, {"time": T, "u": U, "y": Y}), **options)
     assert says in str(caught.value)
 
 
 def test_a_table_without_time_needs_a_rate(tmp_path: Path) -> None:
-    """The refusal says so, and with the rate it reads; a first row of numbers is no header."""
+    """The error says so, and with a rate the file is read; a first row of numbers is no header."""
     path = csv_of(tmp_path, {"u": U, "y": Y})
     with pytest.raises(BadRecording, match=r"no time column.*--rate in Hz"):
         load(path)
@@ -181,18 +181,18 @@ def test_a_row_for_each_joint(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("force", "way"), [("F [N]", "x [m]"), ("F", "x"), ("I_motor [A]", "slide [m]"), ("u", "x")])
 def test_units_and_symbols_of_physics_tell_a_role_where_no_name_does(tmp_path: Path, force: str, way: str) -> None:
-    """F and x, or any name whose unit is that of a drive, or of a motion."""
+    """F and x, or any name with the unit of a drive, or of a motion."""
     assert_the_axis(load(csv_of(tmp_path, {"t": T, force: U, way: Y, "supply [V]": U * 0.0 + 24.0})))
 
 
 def test_two_that_a_unit_alone_would_take_are_asked_about(tmp_path: Path) -> None:
-    """Both have a unit of drives, and no name."""
+    """Both have a unit of drives, and no known name."""
     with pytest.raises(BadRecording, match=r"'one' and 'two' may both be the input. Choose one with --map input='one'"):
         load(csv_of(tmp_path, {"t": T, "one [A]": U, "two [A]": U, "position": Y}))
 
 
 def echoed(path: Path, joints: Sequence[str], groups: Sequence[Sequence[FloatArray]]) -> Path:
-    """What ros2 topic echo --csv prints of joint states: each field after the other, an empty cell for an empty array."""
+    """Joint states by ros2 topic echo --csv: all fields in sequence, an empty cell for an empty array."""
     rows = []
     for k, at in enumerate(T):
         stamp = 1_700_000_000_987_654_321 + round(at * 1e9)
@@ -204,7 +204,7 @@ def echoed(path: Path, joints: Sequence[str], groups: Sequence[Sequence[FloatArr
 
 
 def test_what_topic_echo_prints_of_joint_states_needs_no_names(tmp_path: Path) -> None:
-    """Two joints with all they have; one without velocities, whose empty array is an empty cell; the time is that of the stamps."""
+    """Two joints with all fields; one without velocities, whose empty array is an empty cell; the time is that of the stamps."""
     both = load(echoed(tmp_path, ("left", "right"), [(Y, 2.0 * Y), (U, U), (U, 3.0 * U)]))
     assert both.axes == ("left", "right") and both.sampling_rate == pytest.approx(RATE, rel=1e-9)
     np.testing.assert_allclose(both.voltage, np.column_stack((U, 3.0 * U)))
@@ -215,11 +215,11 @@ def test_what_topic_echo_prints_of_joint_states_needs_no_names(tmp_path: Path) -
     speeds = load(echoed(tmp_path, ("slider",), [(), (Y,), (U,)]))
     assert speeds.measured == "velocity"
     with pytest.raises(BadRecording, match="slider_position"):
-        load(echoed(tmp_path, ("slider",), [(Y,), (), ()]))  # nothing that drives
+        load(echoed(tmp_path, ("slider",), [(Y,), (), ()]))  # no input
 
 
 def in_own_rows(folder: Path, columns: dict[str, tuple[np.ndarray, np.ndarray]]) -> Path:
-    """A CSV with a row for each instant of each column, as PlotJuggler and joined tables have it. columns: instants and values."""
+    """A CSV with a row for each time of each column, as by PlotJuggler and joined tables. columns: times and values."""
     time = np.concatenate([instants for instants, _ in columns.values()])
     order, begin, table = np.argsort(time, kind="stable"), 0, {}
     for name, (instants, values) in columns.items():
@@ -231,16 +231,16 @@ def in_own_rows(folder: Path, columns: dict[str, tuple[np.ndarray, np.ndarray]])
 
 
 def test_rows_of_their_own_for_input_and_output(tmp_path: Path) -> None:
-    """PlotJuggler writes a row for each stamp of each topic: the input is held until its next."""
+    """PlotJuggler writes a row for each stamp of each topic: the input is held until its next value."""
     recording = load(in_own_rows(tmp_path, {"/x/voltage": (T, U), "/x/position": (T + 0.0003, Y)}))
-    assert recording.sampling_rate == RATE and len(recording) == len(T) - 1 and len(recording.runs()) == 1  # nobody knows what was there at the end
+    assert recording.sampling_rate == RATE and len(recording) == len(T) - 1 and len(recording.runs()) == 1  # unknown at the end
     np.testing.assert_array_equal(recording.voltage[:, 0], U[:-1])
     np.testing.assert_array_equal(recording.position[:, 0], Y[:-1])
     assert any("separate times" in note for note in recording.notes)
 
 
 def test_two_axes_may_have_rows_of_their_own(tmp_path: Path) -> None:
-    """Four topics with four stamps: the second position is interpolated to the instants of the first."""
+    """Four topics with four stamps: the second position is interpolated to the times of the first."""
     columns = {
         "/x/voltage": (T, U),
         "/y/voltage": (T + 0.0001, 2 * U),
@@ -268,13 +268,13 @@ def test_of_a_faster_input_the_mean_is_taken_and_of_a_sparse_one_the_latest(tmp_
 
 
 def test_words_in_other_columns_do_not_matter(tmp_path: Path) -> None:
-    """A column of states is passed over; so is a bad cell in a column that nobody wants."""
+    """A column of states is skipped, and so is a bad cell in an unused column."""
     path = csv_of(tmp_path, {"time": T, "state": ["RUN"] * len(T), "x_voltage": U, "x_position": Y, "note": ["1", *["oops"] * (len(T) - 1)]})
     assert_the_axis(load(path))
 
 
 def test_titles_and_a_row_of_units(tmp_path: Path) -> None:
-    """Lines of one cell above the names are left out, and said; units may stand in a row of their own; a decimal comma is none of columns."""
+    """Lines of one cell above the names are left out, with a note; units may have their own row; a decimal comma is no separator."""
     path = csv_of(tmp_path, {"Time": T, "Voltage": U, "Pos": 1e3 * Y})
     table = path.read_text()
     names, _, rest = table.partition("\n")
@@ -306,7 +306,7 @@ def test_of_several_times_one_is_taken_and_none_is_an_axis(tmp_path: Path) -> No
 
 
 def test_what_may_be_either_is_asked(tmp_path: Path) -> None:
-    """Two columns for one role: both are named, and the option that chooses; of voltage and current the voltage is taken, and said."""
+    """Two columns for one role: the error names both, and the option; of voltage and current the voltage is used, with a note."""
     path = csv_of(tmp_path, {"time": T, "torque left motor": U, "torque motor left": U, "left position": Y})
     with pytest.raises(BadRecording, match=r"'torque left motor' and 'torque motor left' may both be the input\. Choose one with --map left.input="):
         load(path)
@@ -318,7 +318,7 @@ def test_what_may_be_either_is_asked(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("unit", ["ms", "us", "ns"])
 def test_clocks_since_1970_are_understood(tmp_path: Path, unit: str) -> None:
-    """A stamp of 1.8e12 counts ms, and says so; dates are times, too."""
+    """A stamp of 1.8e12 is in ms, with a note; dates are times, too."""
     factor = {"ms": 1e3, "us": 1e6, "ns": 1e9}[unit]
     recording = load(csv_of(tmp_path, {"stamp": np.round((T + 1.8e9) * factor), "u": U, "y": Y}))
     assert recording.sampling_rate == pytest.approx(RATE, rel=1e-3) and len(recording) == len(T)
@@ -354,13 +354,13 @@ def test_clocks_since_1970_are_understood(tmp_path: Path, unit: str) -> None:
     ],
 )
 def test_units(given: str, name: str, scale: float, quantity: str, guessed: bool) -> None:
-    """Known, guessed by another spelling, or carried; what could be two things (NM) is not guessed."""
+    """Known, guessed from another spelling, or kept as text; an ambiguous unit (NM) is not guessed."""
     found = unit_of(given)
     assert (found.name, found.quantity, found.guessed) == (name, quantity, guessed) and found.scale == pytest.approx(scale)
 
 
 def test_units_that_are_guessed_or_unknown_are_said(tmp_path: Path) -> None:
-    """MM is mm, and a note says so; counts are no length; furlongs are carried."""
+    """MM is mm, with a note; counts are no length; furlongs are kept as text."""
     for unit, says in (
         ("MM", "'MM' of the output is taken as mm"),
         ("counts", "counts, which is not a length"),
@@ -373,7 +373,7 @@ def test_units_that_are_guessed_or_unknown_are_said(tmp_path: Path) -> None:
 
 
 def test_a_velocity_in_a_unit_that_is_not_known_is_no_position(tmp_path: Path) -> None:
-    """The name means a velocity: one line says what to give, and with that the file is read."""
+    """The name means a velocity: one line names the option, with which the file is read."""
     path = csv_of(tmp_path, {"time": T, "u": U, "speed [knots]": Y})
     with pytest.raises(BadRecording, match=r"the unit 'knots' of the velocity 'speed' is not known\. .* --unit output=rpm"):
         load(path)
@@ -399,7 +399,7 @@ def test_arrays_take_the_same_names_and_options(tmp_path: Path, kind: str) -> No
 
 
 def test_structs_of_control_desk_simulink_and_iddata(tmp_path: Path) -> None:
-    """X and Y(n).Data with names, signals(n).values with labels, InputData and OutputData with Ts; in structs in structs, too."""
+    """X and Y(n).Data with names, signals(n).values with labels, InputData and OutputData with Ts; also in nested structs."""
     path = tmp_path / "a.mat"
     block = {"Name": '"Model Root"/"{}"/"In1"', "Unit": ""}
     y = [{**block, "Name": block["Name"].format(name), "Data": values} for name, values in (("Motor positie", Y), ("motor input", U))]
@@ -430,7 +430,7 @@ def test_structs_of_control_desk_simulink_and_iddata(tmp_path: Path) -> None:
     ],
 )
 def test_a_unit_at_the_end_of_a_mapped_name_is_read(tmp_path: Path, name: str, unit: str, scale: float) -> None:
-    """As programs write them, without brackets and strokes; the note says what was converted."""
+    """Units as written by programs, without brackets and slashes; the note gives the conversion."""
     t = np.arange(400) / 1e3
     y = np.cumsum(np.cumsum(np.random.default_rng(1).normal(size=400)))
     path = tmp_path / "a.csv"

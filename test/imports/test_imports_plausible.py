@@ -1,4 +1,4 @@
-"""What looks wrong is said in words, with what to do; none of it is said of a good recording."""
+"""Suspicious data give notes with the next action; a good recording gives none."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HALF = np.arange(len(T)) > len(T) // 2
 
 
 def notes_of(path: Path, **columns: Any) -> str:
-    """All that is said about an axis with these columns changed."""
+    """All notes about an axis with these columns changed."""
     content = {"time": T, "x_voltage": U, "x_position": Y} | columns
     return " | ".join(load(csv_of(path, content)).notes)
 
@@ -50,14 +50,14 @@ def test_nothing_is_said_of_a_good_recording(tmp_path: Path) -> None:
     ],
 )
 def test_what_looks_wrong_is_said(tmp_path: Path, columns: dict[str, Any], says: str) -> None:
-    """Swapped columns, units, gaps, constant, standing, stuck, saturated, the same twice: in seconds, with the next act."""
+    """Swapped columns, units, gaps, constant, at rest, stuck, saturated, duplicates: with times in s and the next action."""
     begun = time.process_time()
     assert says in notes_of(tmp_path, **columns)
     assert time.process_time() - begun < 5.0
 
 
 def test_an_angle_that_wraps_is_unwrapped_and_that_is_said(tmp_path: Path) -> None:
-    """Kept within a turn, it leaps by one and goes on all the same; the same angle as it is does not leap."""
+    """An angle wrapped to one turn jumps and is unwrapped; an angle without wrapping does not jump."""
     angle = 20 * Y / np.ptp(Y)
     turns = int(np.sum(np.abs(np.diff((angle + np.pi) % (2 * np.pi))) > 3.0))
     path = csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position[rad]": (angle + np.pi) % (2 * np.pi) - np.pi})
@@ -69,7 +69,7 @@ def test_an_angle_that_wraps_is_unwrapped_and_that_is_said(tmp_path: Path) -> No
 
 
 def test_a_reference_is_unwrapped_by_itself(tmp_path: Path) -> None:
-    """It leaps a few samples before the output does; one that never leaps stays as it is."""
+    """The reference jumps a few samples before the output; one without jumps is unchanged."""
     angle = 30.0 * T - np.pi
     for reference, wrapped in ((angle + 0.1, True), (angle + 0.1, False)):
         columns = {"time": T, "u": U, "y[rad]": np.angle(np.exp(1j * angle)), "r[rad]": np.angle(np.exp(1j * reference)) if wrapped else reference}
@@ -87,7 +87,7 @@ def test_a_reference_is_unwrapped_by_itself(tmp_path: Path) -> None:
     ],
 )
 def test_counts_and_degrees_that_wrap_are_said(tmp_path: Path, name: str, turn: int, says: str) -> None:
-    """By which leap, and how often; the same numbers without leaps say nothing, nor does an axis that moves rarely and fast."""
+    """The note gives size and number of the jumps; there is none without jumps, or for an axis with rare, fast moves."""
     counts = np.rint(5.3 * turn * T / T[-1])
     (said,) = [note for note in load(csv_of(tmp_path, {"time": T, "u": U, name: counts % turn})).notes if "wraps" in note]
     assert re.search(says, said) and " 5 times" in said
@@ -111,7 +111,7 @@ def test_units_that_do_not_fit_are_said(tmp_path: Path, head: dict[str, Any], sa
 
 
 def test_one_column_for_both_is_refused(tmp_path: Path) -> None:
-    """Voltage equal to position: no answer would mean anything. Beside another axis that axis alone is left out."""
+    """Voltage equal to position: no meaningful answer. With another axis only this one is left out."""
     said = refused("diagnose", csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": U}))
     assert "input and output of axis x are the same numbers" in said and "--map" in said
     recording = load(csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": U, "z_voltage": U, "z_position": Y}))
@@ -119,14 +119,14 @@ def test_one_column_for_both_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_dead_part_becomes_a_gap(tmp_path: Path) -> None:
-    """An encoder that stops half-way: the rest is read; so the model is that of the rest, and not of an effect that nobody has."""
+    """An encoder that stops half-way: the rest is read, so the model is that of the rest, without a false effect."""
     middle = (np.arange(len(T)) > 1000) & (np.arange(len(T)) < 2200)
     recording = load(csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": np.where(middle, Y[1001], Y)}))
     assert len(recording) == int(np.sum(~middle)) and len(recording.runs()) == 2
 
 
 def test_a_joint_that_waits_takes_no_part_from_the_others(tmp_path: Path) -> None:
-    """A joint that moves for a moment between two rests is held, and not dead: the other keeps all of its samples."""
+    """A joint with a short motion between two rests is held, not dead: the other keeps all of its samples."""
     moment = (np.arange(len(T)) > 1000) & (np.arange(len(T)) < 1100)
     waiting = np.where(moment, Y - Y[1001], 0.0)
     recording = load(csv_of(tmp_path, {"time": T, "x_voltage": U, "x_position": Y, "z_voltage": U[::-1], "z_position": waiting}))
@@ -135,19 +135,19 @@ def test_a_joint_that_waits_takes_no_part_from_the_others(tmp_path: Path) -> Non
 
 
 def test_a_robots_q_is_an_angle(tmp_path: Path) -> None:
-    """The coordinate of a joint that is driven by a torque is in rad, and a position of an axis in m."""
+    """The coordinate of a joint with a torque input is in rad, the position of an axis in m."""
     recording = load(csv_of(tmp_path, {"time": T, "tau": U, "q": Y}))
     assert (recording.input_unit, recording.output_unit) == ("N m", "rad")
     assert load(csv_of(tmp_path, {"time": T, "x_torque": U, "x_position": Y})).output_unit == "m"
 
 
 def test_switching_inputs_are_no_saturation(tmp_path: Path) -> None:
-    """Two levels by nature (PRBS), three levels by a relay: nothing is said."""
+    """Two levels of a PRBS, three levels of a relay: no note."""
     assert "saturated" not in notes_of(tmp_path, x_voltage=np.sign(U))
 
 
 def test_answers_with_json_carry_the_notes(tmp_path: Path) -> None:
-    """Nobody who reads JSON misses them."""
+    """The notes are also in the JSON document."""
     path = csv_of(tmp_path, {"time": T, "x_voltage": np.clip(U, -0.5, 0.5), "x_position": Y})
     short = ("--set", "length=512", "--json")
     assert any("saturated" in note for note in cli("frf", path, *short).json["recording"]["notes"])
@@ -157,7 +157,7 @@ def test_answers_with_json_carry_the_notes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", ["emps/emps_train.npz", "lsb250/lsb250_exp1.npz", "hsm150/hsm_pos_0.06_1.npz"])
 def test_good_real_recordings_are_not_doubted(path: str) -> None:
-    """Real machines with real friction and saturation: at most what was converted is said."""
+    """Real machines with friction and saturation: only notes about conversions."""
     recording = load(data(path))
     assert [note for note in recording.notes if "converted" not in note] == []
     assert recording.sampling_rate == pytest.approx(RATE, rel=1e-3)

@@ -21,7 +21,7 @@ def test_the_ur10_bag_gives_six_joints() -> None:
 
 
 def test_the_malformed_bag_is_one_line() -> None:
-    """metadata.yaml names a file that is not there, and the one that is there holds no motion: both are said."""
+    """metadata.yaml names a missing file, and the existing one has no motion: the error names both."""
     with pytest.raises(BadRecording) as caught:
         load(data("joint_state_bags/roblab_hw4"))
     text = str(caught.value)
@@ -38,7 +38,7 @@ def test_the_malformed_bag_is_one_line() -> None:
     ],
 )
 def test_bench_recordings_load(path: str, rate: float, units: tuple[str, str], rows: int) -> None:
-    """Rate from the stamps, units converted or carried, no gap."""
+    """Rate from the stamps, units converted or kept, no gap."""
     recording = load(data(path))
     assert recording.sampling_rate == pytest.approx(rate, rel=2e-4)
     assert (recording.input_unit, recording.output_unit) == units

@@ -1,4 +1,4 @@
-"""A frequency response that was measured elsewhere: read with its units, fitted, exported; what needs samples says so."""
+"""A frequency response measured elsewhere: read with its units, fitted, exported; commands that need samples say so."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def written(path: Path, head: str, columns: tuple[np.ndarray, ...], separator: s
     ],
 )
 def test_hertz_decibels_and_degrees_are_detected_and_said(tmp_path: Path, head: str, columns: tuple[np.ndarray, ...], says: tuple[str, ...]) -> None:
-    """By the headers, or by the numbers where these say nothing or cannot be."""
+    """From the headers, or from the numbers if the headers are missing or impossible."""
     found = xy.frf_from(written(tmp_path / "frf.csv", head, columns))
     ratio = found.response / H
     assert np.allclose(found.frequency, F) and np.allclose(ratio, ratio[0], rtol=1e-6)
@@ -71,7 +71,7 @@ def test_hertz_decibels_and_degrees_are_detected_and_said(tmp_path: Path, head: 
     [("Frequency [furlong],|H|,Phase [deg]", "frequency", "Hz"), ("Frequency [Hz],|H|,Phase [mrad]", "phase", "deg")],
 )
 def test_a_response_in_a_unit_that_is_not_known_is_refused(tmp_path: Path, head: str, what: str, unit: str) -> None:
-    """One line says what is allowed and how to give it; then the file is read."""
+    """One line gives the allowed values and the option; with it the file is read."""
     path = written(tmp_path / "frf.csv", head, (F, abs(H), np.rad2deg(PHASE)))
     with pytest.raises(xy.BadInput, match=f"the unit of the {what} is .*; allowed: {unit}.* Give it with --unit {what}={unit}"):
         xy.frf_from(path)
@@ -80,7 +80,7 @@ def test_a_response_in_a_unit_that_is_not_known_is_refused(tmp_path: Path, head:
 
 @pytest.mark.parametrize(("name", "linear"), [("|H| [m/N]", True), ("Mag [m/s^2/V]", True), ("Gain (dB)", False), ("mag_dB", False)])
 def test_a_unit_of_the_magnitude_says_whether_it_is_in_decibels(tmp_path: Path, name: str, linear: bool) -> None:
-    """However well the other way would fit the phase; no number is negative here."""
+    """Even if the other interpretation fits the phase well; no number is negative here."""
     decibels = 20 * np.log10(abs(H))
     size = decibels - decibels.min() + 1.0 if linear else abs(H)
     found = xy.frf_from(written(tmp_path / "frf.csv", f"freq,{name},Phase (deg)", (F, size, np.rad2deg(PHASE))))
@@ -88,7 +88,7 @@ def test_a_unit_of_the_magnitude_says_whether_it_is_in_decibels(tmp_path: Path, 
 
 
 def test_keywords_say_of_a_file_what_it_does_not_say(tmp_path: Path) -> None:
-    """The averages behind a column of coherence; a name that is not known is refused."""
+    """The averages of a column of coherence; an unknown name is refused."""
     path = written(tmp_path / "frf.csv", "f_Hz,real,imag,coherence", (F, H.real, H.imag, np.full(F.size, 0.9)))
     found = xy.frf_from(path, averages=11, sampling_rate=2000.0)
     assert np.allclose(found.sigma, np.abs(H) * np.sqrt(0.1 / 0.9 / 10)) and found.sampling_rate == 2000.0
@@ -103,7 +103,7 @@ def test_keywords_say_of_a_file_what_it_does_not_say(tmp_path: Path) -> None:
 
 
 def test_columns_that_are_chosen_say_that_a_file_holds_samples_and_no_response(tmp_path: Path) -> None:
-    """A head of frequency and phase is no response where input and output of an axis are mapped."""
+    """Headers of frequency and phase are no response if input and output of an axis are mapped."""
     path = csv_of(tmp_path, {"f": U, "phase": Y})
     assert "no samples in time" in refused("diagnose", path)
     assert load(path, columns={"input": "f", "output": "phase"}, rate=500.0).sampling_rate == 500.0
@@ -123,7 +123,7 @@ def test_a_response_from_a_file_is_fitted_and_exported(tmp_path: Path) -> None:
 
 
 def test_a_response_from_arrays_is_fitted_and_drawn() -> None:
-    """With a sigma of one's own or without; the truth lies in the intervals; the picture is made."""
+    """With and without a given sigma; the truth is in the intervals; the figure is drawn."""
     for sigma in (None, 0.01 * abs(H)):
         response = xy.frf_from(F, H, axis="x", units={"input": "V", "output": "rad"}, sigma=sigma)
         assert (response.input_unit, response.output_unit) == ("V", "rad")
@@ -154,7 +154,7 @@ def test_what_frf_writes_is_read_again(tmp_path: Path) -> None:
 
 
 def test_what_needs_samples_says_so(tmp_path: Path) -> None:
-    """diagnose, compare and loading: one line that names the commands that work; columns lists what was understood."""
+    """diagnose, compare and loading: one line that names the possible commands; columns lists the interpretation."""
     path = written(tmp_path / "frf.csv", "Frequency (Hz),Gain (dB),Phase (deg)", (F, 20 * np.log10(abs(H)), np.rad2deg(PHASE)))
     for command in (("diagnose",), ("frf",), ("refine", "--auto")):
         assert "holds no samples in time" in refused(command[0], path, *command[1:])
@@ -165,7 +165,7 @@ def test_what_needs_samples_says_so(tmp_path: Path) -> None:
 
 
 def test_columns_without_names_are_said(tmp_path: Path) -> None:
-    """--map names them by number; what is missing is named."""
+    """--map names them by number; the error names missing ones."""
     path = tmp_path / "frf.txt"
     np.savetxt(path, np.column_stack((F, 20 * np.log10(abs(H)), np.rad2deg(PHASE))))
     said = cli("fit", path, "--map", "frequency=1,magnitude=2,phase=3", "--unit", "magnitude=dB,phase=deg")
@@ -183,7 +183,7 @@ def test_columns_without_names_are_said(tmp_path: Path) -> None:
     ],
 )
 def test_arrays_that_are_no_response_are_one_line(frequency: np.ndarray, response: np.ndarray, sigma: np.ndarray | None, says: str) -> None:
-    """Lengths that differ, too few lines, no numbers; and a name that is not known."""
+    """Different lengths, too few lines, no numbers; and an unknown name."""
     with pytest.raises(xy.BadInput, match=says):
         xy.frf_from(frequency, response, sigma=sigma)
     with pytest.raises(xy.BadInput, match="coherence"):
@@ -199,7 +199,7 @@ def test_arrays_that_are_no_response_are_one_line(frequency: np.ndarray, respons
     ],
 )
 def test_responses_as_they_were_found(name: str, orders: tuple[int, int], gain: float, zero: float) -> None:
-    """Controllers, whose phase is in degrees though one header says rad: an integrator, a zero, and no fall at the highest lines.
+    """Controllers, with a phase in degrees although one header says rad: an integrator, a zero, and no fall at the highest lines.
 
     The orders come from the data, and two measurements of one controller by different instruments agree within 1 %.
     """
@@ -213,7 +213,7 @@ def test_responses_as_they_were_found(name: str, orders: tuple[int, int], gain: 
 
 
 def test_a_lead_filter_keeps_its_level_and_a_delay_is_told() -> None:
-    """As many zeros as poles, no integrator; the delay is found where there is one and left out where there is none."""
+    """As many zeros as poles, no integrator; a delay is found if there is one, and otherwise left out."""
     f = np.geomspace(1.0, 1000.0, 200)
     lead = 2.0 * (1 + 2j * np.pi * f / 60.0) / (1 + 2j * np.pi * f / 900.0)
     random = np.random.default_rng(4)

@@ -1,4 +1,4 @@
-"""Every measured file in at most two commands: ``columns``, and the one of docs/files.md, which answers with quantity, unit and parameters."""
+"""Every measured file with at most two commands: ``columns``, and that of docs/files.md, which answers with quantity, unit and parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from helpers.real_data import data
 
 from campaigns.faults.shared import NO_RECORDINGS, RECORDINGS
 
-# what the answer says: words, or estimates with their tolerance
+# expected answer: words, or estimates with their tolerance
 SAYS: dict[str, str] = {
     "ball_plate/motor1.npz": "rad/V",
     "bam_servo/bam_xl330_sin_time_square_kp800.csv": "rad/V",
@@ -50,7 +50,7 @@ FINDS: dict[str, dict[str, tuple[float, float, str]]] = {
     "frf_file/G_I_PI_300_DP.csv": {"gain": (8186.0, 80.0, "out/s/in")},
     "frf_file/G_I_PID_300_DP.csv": {"gain": (3629.0, 36.0, "out/s/in")},
     "frf_file/G_I_PID_300_AP.dat": {"gain": (3629.0, 36.0, "out/s/in")},
-    "lsb250/lsb250_exp1.npz": {"antiresonance_1.frequency": (11.8, 0.3, "Hz"), "resonance_1.frequency": (13.5, 0.3, "Hz")},  # friction bends it
+    "lsb250/lsb250_exp1.npz": {"antiresonance_1.frequency": (11.8, 0.3, "Hz"), "resonance_1.frequency": (13.5, 0.3, "Hz")},  # distorted by friction
     "rm_arm/joint_3.npz": {"friction": (0.33, 0.03, "N m")},
     "servo_target/response.json": {"delay": (0.044, 0.004, "s")},
     "tue_bench/load_side.mat": {"resonance_1.frequency": (58.9, 0.2, "Hz")},
@@ -59,7 +59,7 @@ FINDS: dict[str, dict[str, tuple[float, float, str]]] = {
     "vendor_exports/ctrlx_step.trace.csv": {"time_constant": (0.036, 0.003, "s"), "delay": (0.172, 0.003, "s")},
 }
 REFUSES = {"vendor_exports/mitsubishi_mr.csv": "one move in one direction"}
-BESIDE = {"generator/y_cc.csv", "tx40/pos_read_data.csv"}  # the outputs of the files before them
+BESIDE = {"generator/y_cc.csv", "tx40/pos_read_data.csv"}  # the outputs of the previous files
 
 
 def documented() -> dict[str, list[str]]:
@@ -71,7 +71,7 @@ def documented() -> dict[str, list[str]]:
 
 
 def test_every_file_has_its_command() -> None:
-    """No file of the data is without one, and each command has an expectation."""
+    """Every file of the data has a command, and each command has an expectation."""
     commands = documented()
     assert set(commands) == {*SAYS, *FINDS, *REFUSES}
     assert {row.path for row in RECORDINGS} - set(commands) == BESIDE and not set(NO_RECORDINGS) & set(commands)
@@ -79,7 +79,7 @@ def test_every_file_has_its_command() -> None:
 
 @pytest.mark.parametrize("name", [*SAYS, *FINDS, *REFUSES])
 def test_every_measured_file_answers_in_two_commands(name: str) -> None:
-    """The first lists its columns; the second answers, with its quantity, unit and parameters, and asks for no window."""
+    """The first lists its columns; the second answers with quantity, unit and parameters, without a request for a window."""
     command, *options = documented()[name]
     path = data(name)
     assert cli("columns", path).code == 0

@@ -1,4 +1,4 @@
-"""CSV, NPZ and MAT: everything that was saved comes back, and what others wrote is understood or refused in one line."""
+"""CSV, NPZ and MAT: saved data are recovered, and other files are read or refused in one line."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def error_of(path: Path, **options: Any) -> str:
 @ENDINGS
 @pytest.mark.parametrize("axes", [("x",), ("x", "y"), ("carriage", "table", "spindle", "fourth")])
 def test_what_was_saved_comes_back(tmp_path: Path, ending: str, axes: tuple[str, ...]) -> None:
-    """Plain, with gaps, with a counter of its own, with a reference and other units: the same in every bit."""
+    """Plain, with gaps, with a counter, with a reference and other units: the same in every bit."""
     whole = a_recording(600, axes)
     save(whole, tmp_path / f"a.{ending}")
     assert_same(load(tmp_path / f"a.{ending}"), whole)
@@ -75,7 +75,7 @@ def test_a_part_and_an_axis_can_be_taken(tmp_path: Path, ending: str) -> None:
 )
 @pytest.mark.parametrize("decimal", [".", ","])
 def test_units_and_separators_of_a_csv(tmp_path: Path, head: str, separator: str, decimal: str) -> None:
-    """Units in the header become SI and are noted; comma, semicolon, tab and a decimal comma are understood."""
+    """Units in the header are converted to SI with a note; comma, semicolon, tab and a decimal comma are accepted."""
     if separator == decimal:
         pytest.skip("a comma cannot be both")
     milli = "ms" in head
@@ -89,13 +89,13 @@ def test_units_and_separators_of_a_csv(tmp_path: Path, head: str, separator: str
 
 
 def test_a_unit_that_is_not_known_is_carried(tmp_path: Path) -> None:
-    """N or rad stay what they are and are named."""
+    """N or rad are kept as units."""
     recording = load(written(tmp_path, "time,x_input[N],x_output[rad]\n0,1,2\n0.1,3,4\n0.2,5,6\n"))
     assert (recording.input_unit, recording.output_unit, recording.sampling_rate) == ("N", "rad", 10.0)
 
 
 def test_missing_cells_become_gaps(tmp_path: Path) -> None:
-    """An empty cell or nan is no number: its row is left out and counted."""
+    """The row of an empty cell or nan is left out and counted."""
     rows = [f"{i / 100},{i},{i}" for i in range(50)]
     rows[10], rows[20] = "0.1,,10", "0.2,20,nan"
     recording = load(written(tmp_path, "time,u,y\n" + "\n".join(rows)))
@@ -123,7 +123,7 @@ def test_missing_cells_become_gaps(tmp_path: Path) -> None:
     ],
 )
 def test_a_csv_that_cannot_be_read_says_where(tmp_path: Path, text: str, says: str) -> None:
-    """One line with the row, the column and what is there."""
+    """One line with the row, the column and the content."""
     assert says in error_of(written(tmp_path, text))
 
 
@@ -138,7 +138,7 @@ def test_csv_columns_can_be_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", ["npz", "mat"])
 def test_names_and_shapes_of_arrays(tmp_path: Path, ending: str) -> None:
-    """t or time, u or voltage, y or position, rows or columns, one axis or several, units beside."""
+    """t or time, u or voltage, y or position, rows or columns, one axis or several, with units."""
 
     def loaded(**content: Any) -> Recording:
         path = tmp_path / f"a.{ending}"
@@ -163,13 +163,13 @@ def test_names_and_shapes_of_arrays(tmp_path: Path, ending: str) -> None:
 
 
 def test_a_matlab_struct_is_opened(tmp_path: Path) -> None:
-    """A single struct in a .mat file is looked into."""
+    """A single struct in a .mat file is opened."""
     scipy.io.savemat(tmp_path / "a.mat", {"measurement": {"t": T, "u": U, "y": Y, "u_unit": "V"}})
     assert load(tmp_path / "a.mat").sampling_rate == 1000.0
 
 
 def test_jitter_in_the_time_is_no_gap(tmp_path: Path) -> None:
-    """Times that jitter, of which none is lost, give one run and the mean rate."""
+    """Times with jitter and without losses give one run and the mean rate."""
     jitter = np.random.default_rng(4).uniform(-0.45e-3, 0.45e-3, 200)
     np.savez(tmp_path / "a.npz", t=T + jitter, u=U, y=Y)
     recording = load(tmp_path / "a.npz")
@@ -192,13 +192,13 @@ def test_jitter_in_the_time_is_no_gap(tmp_path: Path) -> None:
     ],
 )
 def test_arrays_that_are_no_recording_are_one_line(tmp_path: Path, content: dict[str, Any], says: str) -> None:
-    """What is missing or wrong is named."""
+    """The error names the missing or wrong item."""
     np.savez(tmp_path / "a.npz", allow_pickle=False, **content)
     assert says in error_of(tmp_path / "a.npz")
 
 
 def test_files_that_are_none_are_one_line(tmp_path: Path) -> None:
-    """Empty, cut short, of another kind, a pickle, a MATLAB 7.3 file of zeros: each says what it is."""
+    """Empty, truncated, of another kind, a pickle, a MATLAB 7.3 file of zeros: each error names the cause."""
     save(a_recording(500), tmp_path / "good.npz")
     save(a_recording(500), tmp_path / "good.mat")
     for ending in ("npz", "mat"):
@@ -224,7 +224,7 @@ def test_files_that_are_none_are_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["csv", "npz"])
 def test_the_units_of_axes_that_are_left_out_do_not_matter(kind: str, tmp_path: Path) -> None:
-    """One axis of a robot is chosen and its unit is given: that of the others, which nobody asked for, is no hindrance."""
+    """One axis of a robot is chosen and its unit is given: the units of the others do not matter."""
     if kind == "csv":
         path = csv_of(tmp_path, {"time": T, "x_u": U, "y_u": U, "x_y": Y, "y_y": 2 * Y})
     else:

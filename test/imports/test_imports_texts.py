@@ -1,4 +1,4 @@
-"""Text files as instruments and programs write them: what stands above the table, what parts its cells, how they tell the time."""
+"""Text files of instruments and programs: header lines, separators, and formats of time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LABVIEW = (
 
 
 def written(path: Path, above: str, separator: str = ",", time: Callable[[float], object] = repr, ending: str = "log.csv") -> Path:
-    """A file with T, U and Y below what stands above them."""
+    """A file with T, U and Y below header lines."""
     rows = (separator.join((str(time(float(t))), repr(float(u)), repr(float(y)))) for t, u, y in zip(T, U, Y, strict=True))
     file = path / ending
     file.write_text(above + "\n".join(rows) + "\n", "utf-8")
@@ -29,7 +29,7 @@ def written(path: Path, above: str, separator: str = ",", time: Callable[[float]
 
 
 def assert_read(recording: Recording) -> None:
-    """It holds what was written."""
+    """Assert that the recording has the written data."""
     assert recording.axes == ("x",) and recording.sampling_rate == pytest.approx(RATE, rel=1e-6)
     np.testing.assert_allclose(recording.voltage[:, 0], U, rtol=1e-12)
     np.testing.assert_allclose(recording.position[:, 0], Y, rtol=1e-12, atol=1e-18)
@@ -48,14 +48,14 @@ def assert_read(recording: Recording) -> None:
     ],
 )
 def test_a_table_is_found_below_what_stands_above_it(tmp_path: Path, above: str, separator: str, ending: str) -> None:
-    """Blanks between cells, units in brackets, what oscilloscopes and LabVIEW write first; what is left out is noted."""
+    """Blanks between cells, units in brackets, headers of oscilloscopes and LabVIEW; a note names omitted lines."""
     recording = load(written(tmp_path, above, separator, ending=ending))
     assert_read(recording)
     assert any("are no columns" in note for note in recording.notes) == (above.count("\n") > 2)
 
 
 def test_a_row_of_units_may_hold_one_that_is_not_known(tmp_path: Path) -> None:
-    """It stays the row below the names."""
+    """It is the row below the names."""
     recording = load(written(tmp_path, "time;voltage;position\ns;V;furlong\n", ";"))
     assert_read(recording)
     assert recording.output_unit == "furlong"
@@ -63,7 +63,7 @@ def test_a_row_of_units_may_hold_one_that_is_not_known(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("sign", ["#", "%", "//"])
 def test_remarks_in_a_table_are_left_out(tmp_path: Path, sign: str) -> None:
-    """However they begin; one above the table may hold the names. A row of units that begins with % is none."""
+    """With any comment sign; one above the table may contain the names. A row of units that begins with % is not a remark."""
     assert_read(load(written(tmp_path, f"{sign} made by hand, on bench 7\n{sign} time voltage position\n", " ")))
     file = written(tmp_path, "time,voltage,position\n")
     file.write_text(file.read_text("utf-8").replace("\n0.002,", f"\n{sign} the door was opened here\n0.002,"), "utf-8")
@@ -87,7 +87,7 @@ def test_rows_below_the_table_that_are_no_data_are_left_out(tmp_path: Path, belo
 
 
 def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
-    """savetxt: blanks, and the names in a remark or nowhere."""
+    """savetxt: blanks, and names in a remark or none."""
     table = np.column_stack((T, U, Y))
     np.savetxt(tmp_path / "named.txt", table, header="t u y")
     np.savetxt(tmp_path / "plain.txt", table)
@@ -123,24 +123,24 @@ def test_what_numpy_writes_is_read(tmp_path: Path) -> None:
     ],
 )
 def test_times_in_words_are_understood(tmp_path: Path, time: Callable[[float], object]) -> None:
-    """With a unit, as a clock reads, after a date of any fashion, past midnight."""
+    """With a unit, as time of day, after a date in any format, past midnight."""
     assert_read(load(written(tmp_path, "Time,voltage,position\n", time=time)))
 
 
 def test_a_clock_outside_of_this_century_counts_no_time_since_1970(tmp_path: Path) -> None:
-    """The year 2127 in us is none; such numbers are seconds, as nothing else is said."""
+    """The year 2127 in us is implausible; such numbers are seconds without other information."""
     far = load(written(tmp_path, "time,voltage,position\n", time=lambda t: f"{5e15 + round(1e6 * t):.0f}"))
     assert far.sampling_rate == pytest.approx(1e-6 * RATE) and not any("since 1970" in note for note in far.notes)
 
 
 def test_words_that_are_no_time_are_named(tmp_path: Path) -> None:
-    """The first of them, and what is allowed."""
+    """The error gives the first of them, and the allowed form."""
     with pytest.raises(BadRecording, match=r"the time 'Time' is 'soon' in sample 4\. Give seconds, times like 12:00:00\.001, or dates"):
         load(written(tmp_path, "Time,voltage,position\n", time=lambda t: "soon" if round(1000 * t) == 3 else f"{t} s"))
 
 
 def test_a_bad_cell_near_the_beginning_is_no_title(tmp_path: Path) -> None:
-    """Rows above it are data: they are not left out, and the cell is named."""
+    """Rows above it are data: they are not left out, and the error names the cell."""
     file = written(tmp_path, "time,voltage,position\n")
     lines = file.read_text("utf-8").splitlines()
     lines[3] = lines[3].replace(lines[3].split(",")[1], "broken")
@@ -150,7 +150,7 @@ def test_a_bad_cell_near_the_beginning_is_no_title(tmp_path: Path) -> None:
 
 
 def test_a_column_without_a_telling_name_that_rises_as_a_clock_does_is_the_time(tmp_path: Path) -> None:
-    """LabVIEW's X_Value; a note says so. A counter of rows is no time, and of two clocks nobody knows which."""
+    """LabVIEW's X_Value, with a note. A counter of rows is no time, and two clocks are ambiguous."""
     recording = load(written(tmp_path, "X_Value,voltage,position\n"))
     assert_read(recording)
     assert any(note.startswith("'X_Value' rises by 0.001 from row to row: it is used as the time, in s") for note in recording.notes)

@@ -1,4 +1,4 @@
-"""Uneven time and outputs that are no positions: what is done with them, said, and right."""
+"""Uneven time and outputs other than positions: correct handling, with notes."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from xy_sysid.samples.recording import Recording
 
 
 def wandering(rows: int = 3000, part: float = 0.1) -> FloatArray:
-    """Instants about 1 ms apart, whose period wanders by up to ``part``."""
+    """Times about 1 ms apart, whose period wanders by up to ``part``."""
     steps = 1e-3 * (1 + part * np.sin(np.arange(rows) / 90.0) + 0.3 * part * np.random.default_rng(3).uniform(-1, 1, rows))
     return np.concatenate(([0.0], np.cumsum(steps)))[:rows]
 
 
 def pushed(time: FloatArray, u: FloatArray) -> FloatArray:
-    """Position of a mass of 1 kg with 30 N s/m, by the force ``u`` held from each instant to the next, exactly."""
+    """Exact position of a mass of 1 kg with 30 N s/m, under the force ``u``, held between the times."""
     steps = np.diff(time)
     x, v, found = 0.0, 0.0, [0.0]
     for force, step in zip(u, steps, strict=False):
@@ -39,7 +39,7 @@ def pushed(time: FloatArray, u: FloatArray) -> FloatArray:
 
 
 def test_uneven_samples_are_resampled_and_it_is_said(tmp_path: Path) -> None:
-    """All samples are used, no gap appears, the impulse of the input is kept, and the answer of a known mass comes out."""
+    """All samples are used, there is no gap, the impulse of the input is kept, and a known mass is recovered."""
     time = wandering()
     u = np.repeat(np.random.default_rng(5).normal(size=600), 5)
     y = pushed(time, u)
@@ -53,13 +53,13 @@ def test_uneven_samples_are_resampled_and_it_is_said(tmp_path: Path) -> None:
     whole = np.interp(at[-1] + 1 / recording.sampling_rate, time, np.concatenate(([0.0], np.cumsum(u[:-1] * np.diff(time)))))
     assert np.sum(recording.voltage) / recording.sampling_rate == pytest.approx(whole, rel=1e-6)
     again = pushed(at, recording.voltage[:, 0])
-    counted = pushed(np.arange(len(time)) / recording.sampling_rate, u)[: len(at)]  # samples taken as even, as they stand
+    counted = pushed(np.arange(len(time)) / recording.sampling_rate, u)[: len(at)]  # samples treated as evenly spaced
     error, naive = (float(np.std(np.diff(one - recording.position[:, 0]))) for one in (again, counted))
     assert error < 0.15 * naive
 
 
 def test_gaps_stay_gaps_in_uneven_time(tmp_path: Path) -> None:
-    """Nothing is interpolated over a hole."""
+    """No interpolation over a gap."""
     time = wandering()
     time[1500:] += 0.2
     recording = load(csv_of(tmp_path, {"time": time, "u": U, "y": Y}))
@@ -69,7 +69,7 @@ def test_gaps_stay_gaps_in_uneven_time(tmp_path: Path) -> None:
 
 
 def test_jitter_of_stamps_is_not_taken_for_uneven_samples(tmp_path: Path) -> None:
-    """Stamps in whole ms of samples every 2.5 ms: the samples stay as they are."""
+    """Stamps in whole ms of samples every 2.5 ms: the samples are unchanged."""
     time = np.round(np.arange(3000) * 2.5e-3, 3)
     recording = load(csv_of(tmp_path, {"time": time, "u": U, "y": Y}))
     np.testing.assert_array_equal(recording.voltage[:, 0], U)
@@ -84,7 +84,7 @@ def test_jitter_of_stamps_is_not_taken_for_uneven_samples(tmp_path: Path) -> Non
     ],
 )
 def test_time_too_uneven_is_refused(tmp_path: Path, make: object, says: str) -> None:
-    """Bursts and time that is mostly gaps: the steps are named, and the option for samples that were even all the same."""
+    """Bursts and mostly gaps: the error gives the steps, and the option for samples that are actually even."""
     assert callable(make)
     path = csv_of(tmp_path, {"time": make(), "u": U, "y": Y})
     with pytest.raises(BadRecording) as caught:
@@ -95,7 +95,7 @@ def test_time_too_uneven_is_refused(tmp_path: Path, make: object, says: str) -> 
 
 @pytest.mark.parametrize("name", ["bam_xl330_sin_time_square_kp800", "bam_xl330_up_and_down_kp100"])
 def test_the_servo_as_it_was_recorded(name: str) -> None:
-    """Uneven time of a real servo: nearly all samples are used, and the resampled file of the same run is met."""
+    """Uneven time of a real servo: nearly all samples are used, and the result agrees with the resampled file of the run."""
     found, even = load(data(f"bam_servo/{name}.csv")), load(data(f"bam_servo/{name}_even.npz"))
     rows = np.loadtxt(data(f"bam_servo/{name}.csv"), delimiter=",", skiprows=1)
     assert len(found.runs()) == 1 and len(found) >= len(rows) - 3
@@ -105,7 +105,7 @@ def test_the_servo_as_it_was_recorded(name: str) -> None:
 
 
 def test_a_measured_velocity_becomes_the_position_with_that_mean_velocity(tmp_path: Path) -> None:
-    """By unit or by name; the sample-mean velocity is what was measured, sample for sample; the unit is the integral's; it is said."""
+    """By unit or by name; the mean velocity of each sample is the measured one; the unit is that of the integral, with a note."""
     v = np.gradient(Y, T)
     for head, factor, unit in (
         ("x_position[mm/s]", 1e3, "m"),
@@ -135,7 +135,7 @@ def test_a_velocity_gives_the_axis_that_its_position_gives(tmp_path: Path) -> No
 
 
 def test_an_acceleration_is_integrated_twice(tmp_path: Path) -> None:
-    """Without its mean and slow drift; the second difference of the position is what was measured."""
+    """Without its mean and slow drift, the second difference of the position is the measured acceleration."""
     a = np.gradient(np.gradient(Y, T), T) + 0.3
     recording = load(csv_of(tmp_path, {"time": T, "Voltage": U, "acc (m/s^2)": a}))
     assert (recording.measured, recording.output_unit) == ("acceleration", "m")
@@ -145,7 +145,7 @@ def test_an_acceleration_is_integrated_twice(tmp_path: Path) -> None:
 
 
 def test_a_gap_keeps_the_speed_right_on_both_sides() -> None:
-    """Over a gap the velocity is held; within each run the mean velocity is what was measured."""
+    """Over a gap the velocity is held; within each run the mean velocity is the measured one."""
     keep = np.r_[0:100, 150:400]
     v = np.sin(T)[keep][:, None]
     made = Recording(RATE, ("x",), keep.astype(np.int64), T[keep], v, v, "V", "m/s", measured="velocity")
@@ -156,7 +156,7 @@ def test_a_gap_keeps_the_speed_right_on_both_sides() -> None:
 
 
 def test_units_that_differ_between_axes_are_refused(tmp_path: Path) -> None:
-    """mm beside m are the same unit; a velocity beside a position is not."""
+    """mm and m are compatible units; a velocity and a position are not."""
     path = csv_of(tmp_path, {"time": T, "a_voltage": U, "b_voltage": U, "a_position[mm]": 1e3 * Y, "b_position[m]": Y})
     recording = load(path)
     np.testing.assert_allclose(recording.position[:, 0], recording.position[:, 1])
@@ -165,7 +165,7 @@ def test_units_that_differ_between_axes_are_refused(tmp_path: Path) -> None:
 
 
 def overloaded(random: np.random.Generator, rows: int) -> FloatArray:
-    """Cycles that may begin up to ten periods late, and are then made up for."""
+    """Cycles that may begin up to ten periods late, and then catch up."""
     return np.maximum.accumulate(np.arange(rows) + np.where(random.random(rows) < 0.005, random.uniform(1.0, 10.0, rows), 0.0)) * 1e-3
 
 
@@ -180,7 +180,7 @@ def joint_states(path: Path, time: FloatArray, u: FloatArray, y: FloatArray, lag
 
 @pytest.mark.parametrize("lag", [0, 1])
 def test_joint_states_of_a_machine_whose_period_drifts_are_placed_by_their_stamps(tmp_path: Path, lag: int) -> None:
-    """As in a table of uneven time: resampled, said, and the answer of a known mass comes out; taken as even they were off by a tenth."""
+    """As in a table of uneven time: resampled with a note, and a known mass is recovered; treated as even, it would be wrong by 10 %."""
     time = wandering()
     u = np.repeat(np.random.default_rng(5).normal(size=600), 5)
     y = pushed(time, u)
@@ -195,7 +195,7 @@ def test_joint_states_of_a_machine_whose_period_drifts_are_placed_by_their_stamp
 
 @pytest.mark.parametrize("kind", ["jitter", "lost", "late"])
 def test_joint_states_of_a_steady_period_stay_as_they_are(tmp_path: Path, kind: str) -> None:
-    """Stamps that jitter, samples that were lost, cycles that begin late and are made up for: no sample is changed."""
+    """Stamps with jitter, lost samples, late cycles that catch up: no sample is changed."""
     random = np.random.default_rng(7)
     kept = np.delete(np.arange(3000), [400, 401, 1700]) if kind == "lost" else np.arange(3000)
     time = overloaded(random, 3000) if kind == "late" else (kept + random.uniform(-0.2, 0.2, len(kept))) * 1e-3

@@ -1,4 +1,4 @@
-"""Bags of joint states whose drivers give velocities: loaded, fitted, diagnosed and replayed."""
+"""Bags of joint states with velocities only: loaded, fitted, diagnosed and replayed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ UNITS = {"input": "N m", "output": "rad"}
 def wheels(samples: int = 4000) -> tuple[FloatArray, FloatArray]:
     """(samples, 2) effort in N m and velocity in rad/s of two wheels of 3 and 6 rad/s/(N m) with a pole at 20 rad/s.
 
-    The velocity is what a drive makes of its encoder: the mean one of the sample before.
+    The velocity is a drive's difference of its encoder: the mean of the previous sample.
     """
     effort, velocity = np.random.default_rng(2).normal(size=(samples, 2)), np.zeros((samples, 2))
     speed, kept = np.zeros(2), np.exp(-20.0 / RATE)
@@ -38,9 +38,9 @@ def wheels(samples: int = 4000) -> tuple[FloatArray, FloatArray]:
 
 
 def wheel_bag(path: Path, position: float | None = None, kept: Indices | None = None, voltage: bool = False) -> tuple[FloatArray, FloatArray]:
-    """A bag of both wheels, with what their drivers say of positions (None: nothing at all); gives effort and velocity of all samples.
+    """A bag of both wheels, with their drivers' positions (None: none); returns effort and velocity of all samples.
 
-    kept: numbers of the samples that were not lost; voltage: the command is there as blocks, and no effort
+    kept: numbers of the samples that are not lost; voltage: the command is in blocks, without effort
     """
     effort, velocity = wheels()
     clock = 1_700_000_000.0
@@ -58,7 +58,7 @@ def wheel_bag(path: Path, position: float | None = None, kept: Indices | None = 
 
 @pytest.mark.parametrize("position", [None, np.nan])
 def test_a_bag_without_positions_is_read_by_its_velocities_and_that_is_said(tmp_path: Path, position: float | None) -> None:
-    """Empty or NaN alike: each step of the position is the velocity that was measured; in rad, whether rad or rad/s was said."""
+    """Empty or NaN: each step of the position is the measured velocity; in rad, for a given unit of rad or rad/s."""
     effort, velocity = wheel_bag(tmp_path / "bag", position)
     for output in ("rad", "rad/s"):
         found = load(tmp_path / "bag", effort_as_voltage=True, units={**UNITS, "output": output})
@@ -74,7 +74,7 @@ def test_a_bag_without_positions_is_read_by_its_velocities_and_that_is_said(tmp_
 
 
 def test_positions_that_are_there_are_taken_unless_velocities_are_asked_for(tmp_path: Path) -> None:
-    """An angle that wraps is a position: whoever knows better says --velocity."""
+    """A wrapped angle is a position, unless --velocity is given."""
     _, velocity = wheel_bag(tmp_path / "bag", 0.5)
     assert load(tmp_path / "bag", effort_as_voltage=True).measured == "position"
     asked = load(tmp_path / "bag", effort_as_voltage=True, velocity=True, units=UNITS)
@@ -88,7 +88,7 @@ def test_positions_that_are_there_are_taken_unless_velocities_are_asked_for(tmp_
 
 
 def test_joints_that_are_chosen_decide_and_not_those_beside_them(tmp_path: Path) -> None:
-    """A gripper with a position beside wheels without: of the wheels the velocity is the output."""
+    """A gripper with a position and wheels without: for the wheels the velocity is the output."""
     effort, velocity = wheels(400)
     with BagWriter(tmp_path / "bag") as writer:
         for n in range(400):
@@ -103,7 +103,7 @@ def test_joints_that_are_chosen_decide_and_not_those_beside_them(tmp_path: Path)
 
 
 def test_gaps_of_a_bag_of_velocities_leave_both_sides_right(tmp_path: Path) -> None:
-    """Samples that were lost, and one that is NaN, part the runs; within each every step is what was measured."""
+    """Lost samples, and a NaN, separate the runs; within each every step is the measured one."""
     kept = np.delete(np.arange(4000), np.r_[1000:1040, 2500])
     _, velocity = wheel_bag(tmp_path / "bag", None, kept)
     found = load(tmp_path / "bag", effort_as_voltage=True)
@@ -114,7 +114,7 @@ def test_gaps_of_a_bag_of_velocities_leave_both_sides_right(tmp_path: Path) -> N
 
 
 def test_fit_and_diagnose_of_wheels_answer_in_rad(tmp_path: Path) -> None:
-    """Gain of each wheel in rad/s/(N m), the half sample of delay of a drive that differences its encoder, and nothing missing."""
+    """Gain of each wheel in rad/s/(N m), half a sample of delay by the differenced encoder, and no missing effect."""
     wheel_bag(tmp_path / "bag")
     said = ("--effort", "--unit", "input=N m,output=rad")
     options = ("--set", "length=512", "--set", "band_high=60", "--set", "numerator_order=0", "--set", "denominator_order=2", "--json")
@@ -152,7 +152,7 @@ def test_a_replay_integrates_as_loading_does(tmp_path: Path, voltage: bool) -> N
 
 
 def test_replay_takes_the_live_parameters_or_the_option(tmp_path: Path) -> None:
-    """output: velocity in the live file, or --velocity, gives the same answer in rad though rad/s was said of the velocity."""
+    """output: velocity in the live file, or --velocity, gives the same answer in rad, although the unit of the velocity is given as rad/s."""
     wheel_bag(tmp_path / "bag", 0.25)
     common: dict[str, Any] = {"length": 256, "band_high": 60.0, "input_unit": "N m", "output_unit": "rad/s"}
     hears = {"source": "joint_state", "joint_topic": "/joint_states", "effort_as_voltage": True, "output": "velocity"}

@@ -1,4 +1,4 @@
-"""Exports as the tools of vendors write them, made here in the same form; and as they were found, where these data are."""
+"""Exports of vendors' tools, generated here in the same form, and original ones if available."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from xy_sysid.imports.several import read_all
 
 
 def scope(path: Path, comma: bool) -> Path:
-    """A TwinCAT 3 Scope export: a column of times for each channel, header lines of other widths, and rows that end sooner for slow channels."""
+    """A TwinCAT 3 Scope export: a column of times for each channel, header lines of other widths, and shorter rows for slow channels."""
 
     def told(value: float) -> str:
         return f"{value:.9g}".replace(".", ",") if comma else f"{value:.9g}"
@@ -37,7 +37,7 @@ def scope(path: Path, comma: bool) -> Path:
 
 @pytest.mark.parametrize("comma", [False, True])
 def test_a_twincat_scope_export_has_a_time_for_each_channel(tmp_path: Path, comma: bool) -> None:
-    """The input at 2 kHz is held to the instants of the output at 1 kHz, with the units of the file."""
+    """The input at 2 kHz is held to the times of the output at 1 kHz, with the units of the file."""
     found = load(scope(tmp_path, comma))
     assert found.sampling_rate == RATE and (found.input_unit, found.output_unit) == ("V", "rad")
     assert np.allclose(found.voltage[:, 0], U, rtol=1e-6) and np.allclose(found.position[:, 0], Y, rtol=1e-6, atol=1e-12)
@@ -53,7 +53,7 @@ def test_twincat_scope_exports_as_they_were_found(name: str, rows: int) -> None:
 
 
 def test_a_channel_that_rises_evenly_is_not_the_time_of_others(tmp_path: Path) -> None:
-    """Each channel has its own time, so that a counter beside them is a channel as any."""
+    """Each channel has its own time, so that a counter is an ordinary channel."""
     names = ("MAIN.u", "MAIN.angle", "MAIN.cycle")
     lines = ["\t".join(f"{what}\t{one}" for one in cells) for what, cells in (("Name", names), ("SampleTime[ms]", ("1",) * 3))]
     for row, values in enumerate(zip(U.tolist(), Y.tolist(), (0.2 * np.arange(len(U))).tolist(), strict=True)):
@@ -64,7 +64,7 @@ def test_a_channel_that_rises_evenly_is_not_the_time_of_others(tmp_path: Path) -
 
 
 def test_a_codesys_trace_is_read(tmp_path: Path) -> None:
-    """Variables below each other, each with samples of its own; of a bad row the number is said."""
+    """Variables in sequence, each with its own samples; the error gives the number of a bad row."""
     head = "[key]; [value]\nVersion; 0x03050000\n"
     parts = [
         f"{place}.Variable; PLC.{name}\n{place}.Class; 14\n{place}.Data; \n"
@@ -81,7 +81,7 @@ def test_a_codesys_trace_is_read(tmp_path: Path) -> None:
 
 
 def test_the_ctrlx_step_test_gives_its_gain() -> None:
-    """1.075 rpm for each per cent, as its authors found."""
+    """1.075 rpm for each per cent, as published."""
     columns = {"input": "HMI_SP_Local_Automatico", "output": "Velocidad_Scaled"}
     found = load(data("vendor_exports/ctrlx_step.trace.csv"), columns=columns, units={"input": "%", "output": "rpm"})
     speed = np.diff(found.position[:, 0]) * found.sampling_rate * 60 / (2 * np.pi)
@@ -109,7 +109,7 @@ def test_a_mitsubishi_graph_is_torque_to_speed(tmp_path: Path) -> None:
 
 
 def test_pulses_by_the_hundred_are_counts(tmp_path: Path) -> None:
-    """MR Configurator shows droop pulses one by one or by the hundred."""
+    """MR Configurator gives droop pulses singly or in hundreds."""
     path = configurator(tmp_path, Y, U)
     path.write_text(path.read_text("utf-8").replace("Not selected", "Droop pulses (by 100 pls.)").replace(",0.000000,2.5", ",3.000000,2.5"), "utf-8")
     pulses = sheet_of(path, format_of(path)).find("Droop pulses")
@@ -117,7 +117,7 @@ def test_pulses_by_the_hundred_are_counts(tmp_path: Path) -> None:
 
 
 def test_one_move_in_one_direction_tells_nothing(tmp_path: Path) -> None:
-    """Friction, load and inertia cannot be told from it: this is said, and diagnose refuses instead of naming effects."""
+    """Friction, load and inertia cannot be determined from it: a note says so, and diagnose refuses."""
     ramp = np.clip(np.minimum(np.arange(2000) - 300, 1700 - np.arange(2000)) / 300.0, 0.0, 1.0)
     path = configurator(tmp_path, 2000.0 * ramp, 20.0 * np.gradient(ramp) * 300 + 3.0 * (ramp > 0))
     assert any("one move in one direction" in note for note in load(path).notes)
@@ -127,14 +127,14 @@ def test_one_move_in_one_direction_tells_nothing(tmp_path: Path) -> None:
 
 
 def test_the_mitsubishi_graph_as_it_was_found() -> None:
-    """Two commands: what it holds, and that it tells nothing."""
+    """Two commands: its content, and the refusal."""
     path = data("vendor_exports/mitsubishi_mr.csv")
     assert "Torque" in cli("columns", path).out
     assert "one move in one direction" in refused("diagnose", path)
 
 
 def test_arrays_of_a_json_log_are_found_by_their_path(tmp_path: Path) -> None:
-    """The arrays of all items of a list are stretches of one recording; one item can be chosen; a rate at the top is taken."""
+    """The arrays of all items of a list are stretches of one recording; one item can be chosen; a rate at the top applies."""
     parts = [slice(0, 1000), slice(1000, 1400), slice(1400, 3000)]
     log = {"fs": RATE, "data": [{"kind": "noise", "actions": U[part].tolist(), "sensor": Y[part].tolist()} for part in parts]}
     path = tmp_path / "log.json"
@@ -164,7 +164,7 @@ def test_arrays_of_a_json_log_are_found_by_their_path(tmp_path: Path) -> None:
     ],
 )
 def test_a_damaged_export_is_refused_in_one_line(tmp_path: Path, ending: str, text: str, says: str) -> None:
-    """JSON with a number that no double holds; a Mitsubishi graph whose two rows of names differ in width."""
+    """JSON with a number beyond double range; a Mitsubishi graph whose two rows of names differ in width."""
     path = tmp_path / f"a.{ending}"
     path.write_text(text, "utf-8")
     with pytest.raises(BadRecording, match=says):
@@ -180,7 +180,7 @@ def test_a_twincat_scope_export_with_a_long_head_is_known(tmp_path: Path) -> Non
 
 
 def test_input_and_output_in_two_files_are_joined_by_row_or_by_time(tmp_path: Path) -> None:
-    """FILE:COLUMN names them; which way was taken is said; files of other lengths without a time are refused."""
+    """FILE:COLUMN names them, with a note on the method; files of different lengths without a time are refused."""
     one, other = tmp_path / "u.csv", tmp_path / "y.csv"
     np.savetxt(one, U)
     np.savetxt(other, Y)
@@ -211,7 +211,7 @@ def test_input_and_output_in_two_files_are_joined_by_row_or_by_time(tmp_path: Pa
     ids=["ns", "us", "ms", "s", "date", "clock"],
 )
 def test_stamps_of_any_kind_join_two_files(tmp_path: Path, stamp: Callable[[float], str]) -> None:
-    """They count from one origin: a file that begins 5 samples later is not moved to the beginning of the other."""
+    """They have one origin: a file that begins 5 samples later is not shifted to the start of the other."""
     for name, values, rows in (("u", U, slice(None)), ("y", Y, slice(5, None))):
         lines = [f"{stamp(t)},{value!r}" for t, value in zip(T[rows].tolist(), values[rows].tolist(), strict=True)]
         (tmp_path / f"{name}.csv").write_text("\n".join([f"time,{name}", *lines, ""]))
@@ -221,7 +221,7 @@ def test_stamps_of_any_kind_join_two_files(tmp_path: Path, stamp: Callable[[floa
 
 
 def test_a_time_that_was_said_is_the_clock_of_its_file(tmp_path: Path) -> None:
-    """The other file's is found by its name, and the two are joined by their times."""
+    """The time of the other file is found by its name, and the two are joined by their times."""
     twice = np.arange(2 * len(T)) / (2 * RATE)
     for path, name, t, values in (("u.csv", "clk,motor", twice, np.repeat(U, 2)), ("y.csv", "time,angle", T, Y)):
         np.savetxt(tmp_path / path, np.column_stack((t, values)), delimiter=",", header=name, comments="")
@@ -232,7 +232,7 @@ def test_a_time_that_was_said_is_the_clock_of_its_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["npz", "mat"])
 def test_arrays_may_have_stamps_since_1970(tmp_path: Path, kind: str) -> None:
-    """Of ns, as in a table; a note says so."""
+    """Times in ns, as in a table, with a note."""
     content = {"t": np.rint(1.8e18 + 1e9 * T), "u": U, "y": Y}
     path = tmp_path / f"a.{kind}"
     np.savez(path, allow_pickle=False, **content) if kind == "npz" else scipy.io.savemat(path, content)
@@ -242,7 +242,7 @@ def test_arrays_may_have_stamps_since_1970(tmp_path: Path, kind: str) -> None:
 
 
 def test_both_files_may_be_given_as_recordings(tmp_path: Path) -> None:
-    """The files whose columns are joined are one recording, and not two."""
+    """Files with joined columns are one recording, not two."""
     np.savetxt(tmp_path / "u.csv", U)
     np.savetxt(tmp_path / "y.csv", Y)
     said = cli("frf", tmp_path / "u.csv", tmp_path / "y.csv", "--map", "input=u.csv:1,output=y.csv:1", "--rate", "1000")
@@ -250,7 +250,7 @@ def test_both_files_may_be_given_as_recordings(tmp_path: Path) -> None:
 
 
 def test_raw_data_of_a_klipper_accelerometer_are_an_output_of_acceleration(tmp_path: Path) -> None:
-    """In mm/s^2, with the command in a file of its own; its power spectra are refused, since they have no phase."""
+    """In mm/s^2, with the command in a separate file; its power spectra are refused, since they have no phase."""
     acceleration = np.gradient(np.gradient(Y, T), T)
     rows = np.column_stack((T, 1e3 * acceleration, np.zeros((len(T), 2))))
     np.savetxt(tmp_path / "raw.csv", rows, delimiter=",", header="time,accel_x,accel_y,accel_z", comments="#")
@@ -264,7 +264,7 @@ def test_raw_data_of_a_klipper_accelerometer_are_an_output_of_acceleration(tmp_p
 
 
 def test_a_reference_in_another_quantity_is_refused(tmp_path: Path) -> None:
-    """A number is no unit, and a length is no angle; degrees of a reference become rad as those of the output do."""
+    """A number is no unit, and a length is no angle; degrees of a reference are converted to rad like those of the output."""
     np.savez(tmp_path / "a.npz", t=T, u=U, y=Y, r=np.rad2deg(Y))
     with pytest.raises(BadInput, match="reference=3"):
         load(tmp_path / "a.npz", units={"output": "rad", "reference": "3"})
@@ -275,7 +275,7 @@ def test_a_reference_in_another_quantity_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_note_about_all_recordings_is_said_once(tmp_path: Path) -> None:
-    """One of all of them, another of some by their names; and not once for each file."""
+    """One note for all of them, another for some with their names; not one for each file."""
     paths = []
     for number in range(6):
         paths.append(tmp_path / f"part{number}.csv")

@@ -1,4 +1,4 @@
-"""Smaller models that answer as the larger ones did."""
+"""Smaller models with the response of the larger ones."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def times(tf: TransferFunction, numerator: list[float], denominator: list[float]
 
 
 def test_a_pole_and_a_zero_on_each_other_go() -> None:
-    """Real and paired; delay, gain and response stay."""
+    """Real and paired; delay, gain and response are kept."""
     tf = paper_machine()
     larger = times(times(tf, [1.0, 500.0], [1.0, 500.02]), [1.0, 80.0, 9e5], [1.0, 80.001, 9.00001e5])
     small = minreal(larger)
@@ -45,7 +45,7 @@ def test_what_only_lies_near_stays() -> None:
 
 
 def test_cancellation_works_in_z() -> None:
-    """Two equal roots inside the circle."""
+    """Two equal roots inside the unit circle."""
     tf = TransferFunction(np.array([0.2, -0.1]), np.array([1.0, -1.3, 0.4]), 0.0, 1 / RATE)
     small = minreal(tf)
     assert np.allclose(small.removed, [0.5])
@@ -55,7 +55,7 @@ def test_cancellation_works_in_z() -> None:
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
 def test_balanced_truncation_keeps_its_bound(order: int) -> None:
-    """Twice the sum of the Hankel singular values cut is never exceeded, and is not far from what is reached."""
+    """The error never exceeds twice the sum of the removed Hankel singular values, and is not far below it."""
     tf = TransferFunction(np.array([1.0]), np.ones(1))
     for pole, zero in ((20.0, 25.0), (90.0, 60.0), (300.0, 1000.0), (1500.0, 1200.0), (4000.0, 9000.0)):
         tf = times(tf, [1.0 / zero, 1.0], [1.0 / pole, 1.0])
@@ -71,7 +71,7 @@ def test_balanced_truncation_keeps_its_bound(order: int) -> None:
 
 
 def test_integrators_stay_when_states_are_cut() -> None:
-    """The paper's machine with its weak base mode cut: a rigid axis with the velocity gain nearly kept."""
+    """The paper's machine without its weak base mode: a rigid axis with nearly the same velocity gain."""
     tf = paper_machine()
     cut = balanced_truncation(tf, 2)
     assert cut.tf.integrators == 1
@@ -81,7 +81,7 @@ def test_integrators_stay_when_states_are_cut() -> None:
 
 
 def test_truncation_works_in_z_and_keeps_unstable_poles() -> None:
-    """A sampled stable function within its bound; a pole on the right is left where it is."""
+    """A sampled stable function within its bound; a pole in the right half plane is kept."""
     sampled = discrete(TransferFunction(np.array([1.0, 3000.0, 5e6]), polynomial(-40.0, -700.0, -2500.0, -900.0)), RATE)
     cut, frequency = balanced_truncation(sampled, 2), lines(900, 1.1)
     assert np.max(np.abs(cut.tf.response(frequency) - sampled.response(frequency))) <= cut.bound * (1 + 1e-6)
@@ -90,6 +90,6 @@ def test_truncation_works_in_z_and_keeps_unstable_poles() -> None:
 
 
 def test_an_order_out_of_range_is_refused() -> None:
-    """It names what must stay."""
+    """The error names the poles that must be kept."""
     with pytest.raises(BadInput, match="order is 0; allowed: 1 to 4"):
         balanced_truncation(paper_machine(), 0)

@@ -1,4 +1,4 @@
-"""Transfer functions in the time domain: exact at the samples, whatever the delay."""
+"""Transfer functions in the time domain: exact at the samples, for any delay."""
 
 from __future__ import annotations
 
@@ -63,20 +63,20 @@ def test_the_discrete_form_is_exact(delay: float) -> None:
 
 
 def test_direct_feedthrough_is_seen_at_once() -> None:
-    """Equal orders: the output jumps with the input, a part of a sample later with such a delay."""
+    """Equal orders: the output jumps with the input, a fraction of a sample later with such a delay."""
     tf = TransferFunction(np.array([2.0, 0.0]), np.array([1.0, 50.0]))
     assert simulate(tf, RATE, np.array([1.0, 1.0]))[0] == 2.0
     assert simulate(replace(tf, delay=0.2e-3), RATE, np.array([1.0, 1.0]))[0] == 0.0
 
 
 def test_the_simulation_error_is_zero_for_the_truth_and_large_for_another() -> None:
-    """In velocity for an integrating model, whatever the start and drift of the position; per cent explained."""
+    """In velocity for an integrating model, for any start and drift of the position; per cent explained."""
     tf = paper_machine()
     u = np.random.default_rng(3).standard_normal(8000)
     y = simulate(tf, RATE, u) + 0.4
     good = simulation_error(tf, RATE, u - np.mean(u), y)
     assert (good.compared, good.unit) == ("velocity", "m/s")
-    assert good.nrmse > 95.0  # the mean of the voltage was taken away
+    assert good.nrmse > 95.0  # the mean of the voltage was removed
     assert good.seconds == pytest.approx(3.5, abs=0.01)
     exact = simulation_error(tf, RATE, u - np.mean(u), simulate(tf, RATE, u - np.mean(u)))
     assert exact.nrmse > 99.999 and exact.rms < 1e-9

@@ -24,7 +24,7 @@ def test_the_response_is_the_quotient_turned_by_the_delay() -> None:
 
 
 def test_roots_gain_and_integrators() -> None:
-    """Of the paper's machine, whose coefficients span eight powers of ten."""
+    """The roots of the paper's machine, whose coefficients span eight powers of ten."""
     tf = paper_machine()
     pair, zero = 2 * np.pi * 47.56, 2 * np.pi * 46.2
     assert np.allclose(np.sort(np.abs(tf.poles())), [0.0, 246.0, pair, pair])
@@ -62,12 +62,12 @@ def test_gain_and_modes_survive_the_step_to_z() -> None:
     ],
 )
 def test_stability(denominator: list[float], period: float | None, stable: bool) -> None:
-    """No pole on the right (outside the circle); integrators are allowed."""
+    """No pole in the right half plane (outside the unit circle); integrators are allowed."""
     assert TransferFunction(np.ones(1), np.array(denominator), 0.0, period).is_stable is stable
 
 
 def test_phase_type() -> None:
-    """Minimum phase has no delay, and neither zeros nor poles on the right."""
+    """Minimum phase has no delay, and neither zeros nor poles in the right half plane."""
     minimum = TransferFunction(np.array([1.0, 2.0]), np.array([1.0, 3.0, 4.0]))
     assert minimum.phase_type == "minimum"
     assert replace(minimum, delay=1e-3).phase_type == "non-minimum"
@@ -76,7 +76,7 @@ def test_phase_type() -> None:
 
 
 def test_the_pade_form_of_order_four_replaces_the_delay() -> None:
-    """Its known coefficients for a delay of 1 s; all-pass; right to 1e-4 where the delay turns by less than 2.4 rad."""
+    """Its known coefficients for a delay of 1 s; all-pass; accurate to 1e-4 up to a phase of 2.4 rad."""
     tf = TransferFunction(np.ones(1), np.ones(1), 1.0).pade(4)
     assert np.allclose(tf.denominator, [1.0, 20.0, 180.0, 840.0, 1680.0])
     assert np.allclose(tf.numerator, [1.0, -20.0, 180.0, -840.0, 1680.0])

@@ -1,4 +1,4 @@
-"""Closed loop while data come in: the reference as instrument, by its stamps, whatever order and chunking blocks come in."""
+"""Live closed loop: the reference as instrument, matched by its stamps, for any order and chunking of blocks."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def servo() -> Recording:
 
 
 def streams(recording: Recording, size: int = 20, sent: FloatArray | None = None, behind: int = 0) -> Streams:
-    """Blocks of input, output and reference; sent: instants of the reference instead of the samples'; behind: blocks by which it comes late."""
+    """Blocks of input, output and reference; sent: times of the reference instead of the samples'; behind: its delay in blocks."""
     assert recording.reference is not None
     axes, instants = recording.axes, recording.time if sent is None else sent
     for start in range(0, len(recording.seq) + behind * size, size):
@@ -62,7 +62,7 @@ def off(frf: FrequencyResponse) -> float:
 
 
 def test_live_it_is_right_where_output_over_input_is_not_and_the_same_as_offline(servo: Recording) -> None:
-    """H1 is wrong by more than 10 %; joint input-output is within its sigma, and what the whole recording gives."""
+    """H1 is wrong by more than 10 %; joint input-output is within its sigma, and equals the result of the full recording."""
     plain, _ = newest(streams(servo), H1)
     assert off(plain.axes["x"].frf) > 0.1
     request, identifier = newest(streams(servo))
@@ -84,7 +84,7 @@ def test_any_chunking_and_a_late_reference_give_the_same_bit_for_bit(servo: Reco
 
 
 def test_a_reference_on_a_clock_that_leads_and_jitters_is_the_same_instrument(servo: Recording) -> None:
-    """Sent 7 ms ahead, give or take half a period: another instrument by a little, and no bias."""
+    """Sent 7 ms early, with half a period of jitter: a slightly different instrument, without bias."""
     jitter = np.random.default_rng(5).uniform(-0.5, 0.5, ROWS) / SERVO.rate
     request, identifier = newest(streams(servo, sent=servo.time - 0.007 + jitter))
     assert off(request.axes["x"].frf) < 0.05 and identifier.faults == {}
@@ -93,7 +93,7 @@ def test_a_reference_on_a_clock_that_leads_and_jitters_is_the_same_instrument(se
 
 
 def test_samples_without_a_reference_are_no_windows_and_that_is_said(servo: Recording) -> None:
-    """No reference at all: nothing to fit, and the reason; one that pauses for two seconds: the windows there are dropped."""
+    """No reference: no fit, with the reason; a pause of two seconds: the windows there are dropped."""
     silent = Identifier(JOINT, ("x",))
     assert [one for kind, block in streams(servo) if kind != "reference" for one in silent.feed(kind, block)] == []
     assert silent.faults["no_reference"] > ROWS - JOINT.reorder * SERVO.rate - 40 and "no reference for" in silent.sentences["no_reference"]
@@ -124,7 +124,7 @@ def test_it_goes_on_after_a_restart_from_its_state(servo: Recording) -> None:
 
 
 def test_a_bad_reference_is_refused_in_words() -> None:
-    """Other columns, NaN, a clock that goes back: counted, said, and what was paired before is not touched."""
+    """Other columns, NaN, a clock that goes back: counted and reported, without effect on earlier pairs."""
     hold = ReferenceHold(("x",), 0.5)
     three = np.arange(3.0)
     samples = Samples(0, np.zeros((3, 1)), np.zeros((3, 1)), three / 10)

@@ -1,4 +1,4 @@
-"""Two axes at once, while data come in: the verdict and the topics of the cross responses are those of the recording."""
+"""Two axes at once, live: the verdict and the topics of the cross responses are those of the recording."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SETTINGS = IdentifierSettings(length=256, band_low=2.0, band_high=100.0)
 
 
 def machine(cross: float, same: bool = False, seconds: float = 200.0) -> Recording:
-    """Two axes, each moved by a part of the other's motion; same: one signal drives both."""
+    """Two axes, each moved by a fraction of the other's motion; same: one signal drives both."""
     random = np.random.default_rng(3)
     u = random.normal(size=(int(seconds * RATE), 2))
     u[:, 1] = u[:, 0] if same else u[:, 1]
@@ -43,7 +43,7 @@ def heard(recording: Recording, block: int, settings: IdentifierSettings = SETTI
 
 @pytest.mark.parametrize(("cross", "level", "words"), [(0.0, OK, "two single-axis models suffice"), (0.1, WARN, "do not suffice there")])
 def test_the_topics_tell_cross_responses_bands_and_verdict(cross: float, level: int, words: str) -> None:
-    """In any chunking, and as the recording tells it with the same windows."""
+    """In any chunking, and equal to the result of the recording with the same windows."""
     recording = machine(cross)
     request = heard(recording, 20)
     update = Update(request, {})
@@ -64,7 +64,7 @@ def test_the_topics_tell_cross_responses_bands_and_verdict(cross: float, level: 
 
 
 def test_nothing_is_told_of_one_axis_in_closed_loop_or_with_one_signal() -> None:
-    """There is no verdict where the inputs do not tell the axes apart."""
+    """There is no verdict if the inputs do not distinguish the axes."""
     assert heard(machine(0.0, same=True), 500).coupling is None
     assert heard(machine(0.0), 500, SETTINGS.model_copy(update={"response": "local_polynomial"})).coupling is None
     recording = machine(0.0)
@@ -73,7 +73,7 @@ def test_nothing_is_told_of_one_axis_in_closed_loop_or_with_one_signal() -> None
 
 
 def test_the_report_says_and_draws_it_or_says_why_not() -> None:
-    """Of the two axes that were chosen; with one signal on both, a note instead."""
+    """The verdict is on the two chosen axes; with one signal on both, there is a note instead."""
     found, notes = coupled(machine(0.1), ("y", "x"), SETTINGS)
     assert found is not None and found.axes == ("y", "x") and not notes
     names = [trace.name for trace in coupling_figure(found).data]

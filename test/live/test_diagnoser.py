@@ -1,4 +1,4 @@
-"""The live diagnosis without ROS: what is remembered of the streams, and what is done when."""
+"""The live diagnosis without ROS: memory of the streams, and sequence of the jobs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def send(hearing: Newest | Diagnoser, first: int, last: int, size: int = 20, shi
 
 
 def test_the_newest_seconds_are_kept_whatever_the_blocks() -> None:
-    """Memory is cut to the sample, and the same samples in other blocks are the same."""
+    """Memory is limited to the sample, and independent of the blocks."""
     found = []
     for size in (20, 333):
         hearing = Newest(AXES, memory=4.0, minimum=1.0, reorder=0.5)
@@ -56,7 +56,7 @@ def test_the_newest_seconds_are_kept_whatever_the_blocks() -> None:
 
 
 def test_after_a_gap_the_longer_run_serves_until_the_new_one_will_do() -> None:
-    """One lost block does not make everything heard worthless; a restarted source does."""
+    """After one lost block the received data remain usable; after a restart of the source they do not."""
     hearing = Newest(AXES, memory=100.0, minimum=3.0, reorder=0.1)
     send(hearing, 0, 10_000)
     send(hearing, 10_020, 12_000)
@@ -68,7 +68,7 @@ def test_after_a_gap_the_longer_run_serves_until_the_new_one_will_do() -> None:
 
 
 def test_what_is_not_heard_is_named() -> None:
-    """Which stream, of which axes."""
+    """The error names the stream and its axes."""
     hearing = Newest(AXES, memory=100.0, minimum=3.0, reorder=0.1)
     assert "no voltage and no position of axes x, y received yet" in hearing.lacking()
     hearing.feed("voltage", Block(AXES, np.arange(20.0), np.arange(20.0) / 2000.0, np.zeros((20, 2))))
@@ -76,7 +76,7 @@ def test_what_is_not_heard_is_named() -> None:
 
 
 def play(diagnoser: Diagnoser) -> list[str]:
-    """Everything that waits, as a worker would; what was done."""
+    """Perform all waiting jobs like a worker; returns the activities."""
     said = []
     while (job := diagnoser.start()) is not None:
         for doing, story in perform(job, STANDARD):
@@ -87,7 +87,7 @@ def play(diagnoser: Diagnoser) -> list[str]:
 
 
 def test_requests_are_done_one_after_the_other_and_answered() -> None:
-    """diagnose for both axes, then an effect by its parameter; the ladder falls, the parameter says what is in the model."""
+    """diagnose for both axes, then an effect by its parameter; the error falls, and the parameter lists the model's effects."""
     diagnoser = Diagnoser(DiagnoserSettings(minimum=5.0), AXES)
     send(diagnoser, 0, 24_000)
     number = diagnoser.ask("diagnose")
@@ -109,7 +109,7 @@ def test_requests_are_done_one_after_the_other_and_answered() -> None:
 
 
 def test_once_a_resonance_is_in_the_model_the_next_effects_are_found() -> None:
-    """By add_next and by auto, and again after the model was reset."""
+    """By add_next and by auto, and again after a reset of the model."""
     diagnoser = Diagnoser(DiagnoserSettings(minimum=5.0), AXES)
     send(diagnoser, 0, 20_000, recording=resonance())
     diagnoser.have("x", ("base_resonance",))
@@ -152,7 +152,7 @@ def test_a_diagnosis_falls_due_by_seconds_of_data() -> None:
 
 
 def test_cancelling_answers_everybody_and_keeps_the_stories() -> None:
-    """Requests that wait are given up too; equal ones that wait had been joined."""
+    """Waiting requests are cancelled, too; equal waiting ones were joined."""
     diagnoser = Diagnoser(DiagnoserSettings(minimum=1.0), AXES)
     send(diagnoser, 0, 8000)
     first, second, third = diagnoser.ask("diagnose"), diagnoser.ask("auto"), diagnoser.ask("auto")
@@ -166,7 +166,7 @@ def test_cancelling_answers_everybody_and_keeps_the_stories() -> None:
 
 
 def test_a_diagnosis_that_is_asked_for_twice_is_made_once() -> None:
-    """A lost answer is asked for again while the first is under way; after what was heard is forgotten, a question is another one."""
+    """A repeated request joins the running one if its answer was lost; after a reset of the data it is a new request."""
     diagnoser = Diagnoser(DiagnoserSettings(minimum=1.0), AXES)
     send(diagnoser, 0, 8000)
     number = diagnoser.ask("diagnose")
@@ -183,12 +183,12 @@ def test_a_diagnosis_that_is_asked_for_twice_is_made_once() -> None:
 
 @pytest.mark.parametrize("names", [[""], [], ["", " "]])
 def test_an_empty_name_is_no_effect(names: list[str]) -> None:
-    """ROS parameter files know no empty lists."""
+    """ROS parameter files have no empty lists."""
     assert DiagnoserSettings(effects={"x": names}).chosen("x") == ()
 
 
 def test_each_axis_is_asked_for_by_itself() -> None:
-    """Diagnose on x starts nothing for y; what y waits for can be given up while x goes on."""
+    """Diagnose on x starts nothing for y; a waiting job of y can be cancelled while x continues."""
     diagnoser = Diagnoser(DiagnoserSettings(minimum=1.0), AXES)
     send(diagnoser, 0, 8000)
     first = diagnoser.ask("diagnose", ["x"])
@@ -203,7 +203,7 @@ def test_each_axis_is_asked_for_by_itself() -> None:
 
 
 def test_giving_up_one_axis_of_a_request_leaves_the_others() -> None:
-    """The axis that runs is given up; the one that waits in the same request is next."""
+    """The running axis is cancelled; the one waiting in the same request is next."""
     diagnoser = Diagnoser(DiagnoserSettings(minimum=1.0), AXES)
     send(diagnoser, 0, 8000)
     number = diagnoser.ask("diagnose")
@@ -216,7 +216,7 @@ def test_giving_up_one_axis_of_a_request_leaves_the_others() -> None:
 
 
 def test_it_says_which_seconds_a_story_is_about_and_renews_it() -> None:
-    """From where to where since the samples began to be heard; renewed, the model has its effects on the newest samples, without a diagnosis."""
+    """The used range since the first sample; after renew, the model has its effects on the newest samples, without a diagnosis."""
     diagnoser = Diagnoser(DiagnoserSettings(minimum=5.0, memory=6.0), AXES)
     send(diagnoser, 0, 16_000)
     diagnoser.ask("begin", ["x"])

@@ -1,4 +1,4 @@
-"""What is said of the streams."""
+"""The status of the streams."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ GOOD = Heard(silent=(), paired=100, refused="", refusals=0, stamps="", sentences
 
 
 def test_nothing_is_ok_while_nothing_is_paired() -> None:
-    """Whatever else is known: without a pair the level is not OK."""
+    """Without paired samples the level is never OK."""
     quiet: tuple[tuple[Literal["voltage", "position"], ...], ...] = ((), ("voltage",))
     for silent, refused, stamps, said in itertools.product(quiet, ("", "why"), ("", "clocks"), ({}, {"lost": "2 lost"})):
         heard = Heard(silent=silent, paired=0, refused=refused, refusals=int(bool(refused)), stamps=stamps, sentences=said)
@@ -22,7 +22,7 @@ def test_nothing_is_ok_while_nothing_is_paired() -> None:
 
 
 def test_what_is_wrong_is_said() -> None:
-    """Refusals with their number and reason, clocks, rates; before anything is known only that nothing is paired."""
+    """Refused messages with number and reason, clocks, rates; before any message only that nothing is paired."""
     none = replace(GOOD, paired=0)
     assert verdict(none, "well") == (WARN, "nothing is paired yet")
     assert verdict(replace(none, stamps="the clocks are apart"), "well") == (ERROR, "nothing is paired: the clocks are apart")

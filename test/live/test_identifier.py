@@ -1,4 +1,4 @@
-"""The online logic end to end, without ROS: streams of a simulated machine in, transfer functions and alarms out."""
+"""The online logic end to end, without ROS: from streams of a simulated machine to transfer functions and alarms."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def paper() -> Recording:
 
 @pytest.fixture(scope="module")
 def sound(paper: Recording) -> list[Update]:
-    """All that a minute of a machine gives which does not change."""
+    """All updates from a minute of an unchanged machine."""
     return list(replay(blocks(paper), SETTINGS, AXES))
 
 
 @pytest.fixture(scope="module")
 def loosening() -> list[Update]:
-    """All that a minute of a machine gives whose bolts come loose."""
+    """All updates from a minute of a machine with loosening bolts."""
     return list(replay(blocks(recorded("loose_bolts.yaml", 60.0)), SETTINGS, AXES))
 
 
@@ -82,12 +82,12 @@ def test_loosening_bolts_raise_the_alarm_within_ten_seconds(paper: Recording, lo
 
 
 def test_a_sound_machine_raises_no_alarm(sound: list[Update]) -> None:
-    """A minute at four standard errors: silence."""
+    """A minute at four standard errors without an alarm."""
     assert not any(part.track.alarm for update in sound for part in update.axes.values())
 
 
 def test_the_alarm_is_an_error_with_a_sentence(loosening: list[Update]) -> None:
-    """People read the status; it says which axis, from where to where, and what to look at."""
+    """The status gives the axis, the frequency before and now, and what to check."""
     status = loosening[-1].statuses()[0]
     assert status.level == ERROR
     assert "resonance moved down by" in status.message
@@ -95,7 +95,7 @@ def test_the_alarm_is_an_error_with_a_sentence(loosening: list[Update]) -> None:
 
 
 def spoilt(recording: Recording, seed: int) -> Iterator[tuple[Quantity, Block]]:
-    """Lost, doubled, late and broken blocks, a frozen encoder and a leap."""
+    """Lost, doubled, late and broken blocks, a frozen encoder and a jump."""
     random = np.random.default_rng(seed)
     waiting: list[tuple[Quantity, Block]] = []
     for kind, block in blocks(recording):
@@ -122,7 +122,7 @@ def spoilt(recording: Recording, seed: int) -> Iterator[tuple[Quantity, Block]]:
 
 
 def test_bad_streams_leave_the_response_inside_its_band(paper: Recording, sound: list[Update]) -> None:
-    """Whatever happens to the streams: counted, said, and the estimate stays within five sigma of the truth's neighbourhood."""
+    """Any fault of the streams is counted and reported, and the estimate stays within five sigma of the truth."""
     identifier = Identifier(SETTINGS, AXES)
     final = last(replay(spoilt(paper, 5), SETTINGS, AXES, identifier))
     clean = sound[-1]
@@ -142,7 +142,7 @@ def test_bad_streams_leave_the_response_inside_its_band(paper: Recording, sound:
 
 
 def test_a_saved_state_goes_on_after_a_restart(paper: Recording) -> None:
-    """Half the data, a restart from the saved state, the other half: nothing but the windows around the restart is missing."""
+    """Half the data, a restart from the saved state, the other half: only the windows around the restart are missing."""
     half = 60_000
     a, b = Identifier(SETTINGS, AXES), Identifier(SETTINGS, AXES)
     for kind, block in blocks(paper):
@@ -160,7 +160,7 @@ def test_a_saved_state_goes_on_after_a_restart(paper: Recording) -> None:
 
 
 def test_a_state_of_other_settings_is_refused() -> None:
-    """The error says what was saved and what is wanted."""
+    """The error gives the saved and the required settings."""
     state = Identifier(SETTINGS, AXES).state()
     with pytest.raises(BadInput, match="2048"):
         Identifier(IdentifierSettings(length=2048), AXES).restore(state)
@@ -169,7 +169,7 @@ def test_a_state_of_other_settings_is_refused() -> None:
 
 
 def test_time_that_stands_still_is_counted_not_crashed() -> None:
-    """Without a rate there are no windows, and a counter says so."""
+    """Without a rate there are no windows, and a counter shows it."""
     identifier = Identifier(IdentifierSettings(length=64), ("x",))
     for start in range(0, 4000, 20):
         seq = np.arange(start, start + 20, dtype=float)
@@ -193,7 +193,7 @@ def test_the_transfer_function_message_reads_back(sound: list[Update]) -> None:
 
 
 def test_one_axis_at_rest_does_not_harm_the_other(paper: Recording) -> None:
-    """An axis that is not driven says so; its neighbour is identified."""
+    """An axis without excitation is reported; the other one is identified."""
     still = Recording(
         paper.sampling_rate, AXES, paper.seq, paper.time, paper.voltage * np.array([1.0, 0.0]), paper.position * np.array([1.0, 0.0])
     )  # fmt: skip
@@ -205,7 +205,7 @@ def test_one_axis_at_rest_does_not_harm_the_other(paper: Recording) -> None:
 
 @pytest.mark.parametrize("size", [1, 20])
 def test_a_source_that_comes_back_at_another_rate_starts_new_spectra(size: int) -> None:
-    """500 Hz, then from counter 0 again at 250 Hz: the new rate is used, said, and no window of before is left."""
+    """500 Hz, then again from counter 0 at 250 Hz: the new rate is used and reported, and no earlier window remains."""
     random = np.random.default_rng(2)
     identifier = Identifier(IdentifierSettings(length=256), AXES)
 
@@ -227,7 +227,7 @@ def test_a_source_that_comes_back_at_another_rate_starts_new_spectra(size: int) 
 
 
 def test_a_level_clears_within_ten_seconds_after_a_loss_is_over(paper: Recording) -> None:
-    """Two blocks of position never come: the axes say so at once, are well again within 10 s of data, and the count stays."""
+    """Two lost blocks of position: a warning at once, OK again within 10 s of data, and the count remains."""
     part = slice(0, 80_000)
     short = Recording(paper.sampling_rate, AXES, paper.seq[part], paper.time[part], paper.voltage[part], paper.position[part])
     gone = {("position", 40_000.0), ("position", 40_020.0)}

@@ -1,4 +1,4 @@
-"""What goes on the topics: columns, units and order as the contract says, and a transfer function that reads back."""
+"""Content of the topics: columns, units and order of the contract, and a transfer function that can be read back."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from xy_sysid.live.plain_messages import topic_of
 
 
 def test_a_response_is_rows_of_frequency_real_imag_coherence_sigma() -> None:
-    """Row-major, one line a row, the columns named in the second dimension."""
+    """Row-major, one line per row, the columns named in the second dimension."""
     frf = held(paper_machine(), 0.01)
     message = frf_message("x", frf)
     assert message.topic == "frf/x" and message.labels == ("line", "frequency,real,imag,coherence,sigma") and message.sizes == (len(frf), 5)
@@ -24,7 +24,7 @@ def test_a_response_is_rows_of_frequency_real_imag_coherence_sigma() -> None:
 
 
 def test_a_comparison_is_in_db_and_in_sigma() -> None:
-    """rms of the last column is near 1 for a model that misses nothing."""
+    """The rms of the last column is near 1 for a complete model."""
     frf = held(paper_machine(), 0.01, seed=2)
     fit = identify(frf, Structure())
     message = comparison_message("y", fit)
@@ -36,7 +36,7 @@ def test_a_comparison_is_in_db_and_in_sigma() -> None:
 
 
 def test_a_transfer_function_reads_back() -> None:
-    """Numerator, denominator and delay one after the other, told apart by the sizes of three dimensions."""
+    """Numerator, denominator and delay in sequence, separated by the sizes of three dimensions."""
     for tf in (paper_machine(), replace(paper_machine(0.0), numerator=np.array([5.0]))):
         message = transfer_function_message("x", tf)
         assert message.labels == ("numerator", "denominator", "delay") and sum(message.sizes) == message.data.size
@@ -47,7 +47,7 @@ def test_a_transfer_function_reads_back() -> None:
 
 
 def test_rows_of_samples_and_of_lines_are_named_so() -> None:
-    """The first dimension says what a row is; the numbers are contiguous whatever the array was."""
+    """The first dimension names the kind of row; the numbers are contiguous for any array."""
     rows = np.arange(12.0).reshape(3, 4).T
     message = table("any", ("seq", "time", "x"), rows)
     assert message.labels[0] == "sample" and message.sizes == (4, 3)
@@ -55,7 +55,7 @@ def test_rows_of_samples_and_of_lines_are_named_so() -> None:
 
 
 def test_an_axis_of_any_spelling_has_a_topic() -> None:
-    """What ROS does not allow becomes an underscore; plain names stay as they are."""
+    """Characters that ROS does not allow become underscores; plain names are unchanged."""
     assert [topic_of("frf", axis) for axis in ("x", "shoulder_pan", "joint-2", "left/wrist 3", "2nd")] == [
         "frf/x", "frf/shoulder_pan", "frf/joint_2", "frf/left_wrist_3", "frf/_2nd"
     ]  # fmt: skip

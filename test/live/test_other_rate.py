@@ -1,4 +1,4 @@
-"""A driver that comes back at another rate is followed within ten seconds, and what was learned from a stream does not outlive a reset."""
+"""A driver that restarts at another rate is followed within ten seconds, and a reset clears everything learned from a stream."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from xy_sysid.samples.newest import Newest
 from xy_sysid.samples.pairing import QUANTITIES
 from xy_sysid.settings import IdentifierSettings
 
-SOON = 10.0  # s of data until another rate is noticed
+SOON = 10.0  # s of data until another rate is detected
 RATES = (50.0, 125.0, 250.0, 1000.0)  # Hz, of joint states
 CHANGES = (0.5, 0.7, 0.8, 0.9, 0.96, 0.98, 1.02, 1.04, 1.1, 1.3, 2.0)
 
 
 def stamps(rate: float, seconds: float, start: float, jitter: float = 0.1, lost: float = 0.0, seed: int = 1) -> FloatArray:
-    """Of a driver: late by up to ``jitter`` periods; a part is lost."""
+    """Stamps of a driver: late by up to ``jitter`` periods; some are lost."""
     random = np.random.default_rng(seed)
     count = round(seconds * rate)
     kept = random.random(count) >= lost
@@ -29,12 +29,12 @@ def stamps(rate: float, seconds: float, start: float, jitter: float = 0.1, lost:
 
 
 def counted(counter: JointCounter, times: FloatArray) -> list[Block]:
-    """The blocks that become of the stamps."""
+    """The blocks made from the stamps."""
     return [block for time in times if (block := counter.add(float(time), np.zeros(2))) is not None]
 
 
 def heard(joints: JointCounter, times: FloatArray) -> Iterator[Block]:
-    """Each sample as the node gives it on: one position and one effort."""
+    """Each sample as passed on by the node: one position and one effort."""
     random = np.random.default_rng(7)
     for time in times:
         block = joints.add(float(time), random.standard_normal(2))
@@ -43,7 +43,7 @@ def heard(joints: JointCounter, times: FloatArray) -> Iterator[Block]:
 
 
 def feed(joints: JointCounter, times: FloatArray, *sinks: Identifier | Newest) -> list[Block]:
-    """What was given to who listens: of each sample each quantity by itself."""
+    """Pass each quantity of each sample to a listener separately."""
     blocks = list(heard(joints, times))
     for block in blocks:
         for place, kind in enumerate(QUANTITIES[::-1]):
@@ -55,7 +55,7 @@ def feed(joints: JointCounter, times: FloatArray, *sinks: Identifier | Newest) -
 
 @pytest.mark.parametrize(("rate", "change"), [*itertools.product(RATES[:-1], CHANGES), *((RATES[-1], change) for change in CHANGES[::5])])
 def test_another_rate_of_joint_states_is_followed_within_ten_seconds(rate: float, change: float) -> None:
-    """From half to double, from 2 % on: the counter begins anew, then both live listeners read the rate from 250 samples, and lose nothing more."""
+    """From half to double, from 2 % on: the counter restarts, then both live listeners estimate the rate from 250 samples, without further loss."""
     joints, identifier, newest = (
         JointCounter(("x",), with_voltage=False),
         Identifier(IdentifierSettings(length=64), ("x",)),
@@ -80,14 +80,14 @@ def test_another_rate_of_joint_states_is_followed_within_ten_seconds(rate: float
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize(("jitter", "lost"), [(0.1, 0.0), (0.6, 0.0), (0.3, 0.01), (0.3, 0.05)])
 def test_jitter_and_losses_are_no_other_rate(jitter: float, lost: float, rate: float) -> None:
-    """Two minutes at one rate, or 30,000 samples, are counted through: the counter never begins anew."""
+    """Two minutes at one rate, or 30,000 samples: the counter never restarts."""
     blocks = counted(JointCounter(("x",), with_voltage=False), stamps(rate, min(120.0, 30_000.0 / rate), 5.0, jitter, lost))
     assert np.all(np.diff(np.concatenate([block.seq for block in blocks])) > 0)
 
 
 @pytest.mark.parametrize("seconds", [0.5, 2.0, 8.0])
 def test_two_drivers_on_one_topic_leave_no_trace(seconds: float) -> None:
-    """Two of 250 Hz for a moment, at the start or later; when one is left, the rate is its own within ten seconds."""
+    """Two publishers at 250 Hz for a moment, at the start or later; with one left, its rate is found within ten seconds."""
     for before in (0.0, 6.0):
         joints, identifier = JointCounter(("x",), with_voltage=False), Identifier(IdentifierSettings(length=64), ("x",))
         one, other = stamps(250.0, before + seconds, 100.0, seed=2), stamps(250.0, seconds, 100.0 + before + 0.0013, seed=3)
@@ -99,7 +99,7 @@ def test_two_drivers_on_one_topic_leave_no_trace(seconds: float) -> None:
 @pytest.mark.parametrize("change", [0.8, 0.98, 1.02])
 @pytest.mark.parametrize("rate", [50.0, 125.0, 500.0, 2000.0])
 def test_another_rate_of_blocks_is_followed_within_ten_seconds(rate: float, change: float) -> None:
-    """The counter goes on, and only the time tells."""
+    """The counter continues, and only the time shows it."""
     identifier, random = Identifier(IdentifierSettings(length=64), ("x",)), np.random.default_rng(3)
     time, rows, pace = 0.0, 5, rate
     for first in range(0, round(30.0 * rate), rows):

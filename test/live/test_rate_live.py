@@ -1,4 +1,4 @@
-"""Stamps that jitter: the rate is learnt from all of them, and what it may be off by stands in every frequency's interval."""
+"""Stamps with jitter: the rate is estimated from all of them, and its uncertainty is in the interval of every frequency."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ def last(u: FloatArray, y: FloatArray, time: FloatArray, rows: int = 20) -> Upda
 
 
 def jittered(count: int, seed: int) -> FloatArray:
-    """A period's fifth, rms."""
+    """Stamps with jitter of a fifth of a period, rms."""
     return np.asarray((np.arange(count) + 0.2 * np.random.default_rng(seed).standard_normal(count)) / RATE)
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_an_antiresonance_at_60_hz_is_found_there_with_20_per_cent_of_jitter(seed: int) -> None:
-    """From the first 200 stamps alone it was told at 59.92 +-0.003 Hz: now it is within its interval, which knows of the rate."""
+    """From the first 200 stamps alone the result was 59.92 +-0.003 Hz: now the truth is within the interval, which includes the rate's error."""
     u, y = moved(20.0, seed)
     update = last(u, y, jittered(len(u), 100 + seed))
     fit = update.axes["x"].fit
@@ -64,7 +64,7 @@ def test_an_antiresonance_at_60_hz_is_found_there_with_20_per_cent_of_jitter(see
 
 
 def test_what_the_rate_may_be_off_by_stands_in_every_interval_that_goes_with_it() -> None:
-    """After 6 s of jitter the rate is worth 5e-6 and more: frequencies and the delay are no surer than that; damping goes without it."""
+    """After 6 s of jitter the rate has an error of 5e-6 or more, which is in the intervals of frequencies and delay, but not of damping."""
     u, y = moved(6.0, 3)
     exact, late = (last(u, y, time) for time in (np.arange(len(u)) / RATE, jittered(len(u), 9)))
     sure, unsure = exact.axes["x"], late.axes["x"]
@@ -80,7 +80,7 @@ def test_what_the_rate_may_be_off_by_stands_in_every_interval_that_goes_with_it(
 
 
 def test_the_rate_is_the_same_to_the_last_bit_however_the_samples_come() -> None:
-    """Live and replayed: pieces of any size, one stream ahead of the other."""
+    """Live and replayed, with blocks of any size, and one stream ahead of the other."""
     u, y = moved(8.0, 1)
     time = jittered(len(u), 2)
     reference = last(u, y, time)
@@ -91,7 +91,7 @@ def test_the_rate_is_the_same_to_the_last_bit_however_the_samples_come() -> None
 
 
 def test_what_is_known_of_the_rate_outlives_a_restart() -> None:
-    """Saved with the spectra and taken up again: the rate begins where it was, and not with the next 200 stamps."""
+    """The rate is saved with the spectra and restored, instead of starting from the next 200 stamps."""
     u, y = moved(20.0, 5)
     time = jittered(len(u), 6)
     first = Identifier(SETTINGS, ("x",))

@@ -1,4 +1,4 @@
-"""A complaint is a warning as long as it goes on, and no longer."""
+"""A fault is a warning only as long as it continues."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from xy_sysid.live.recent import CLEARS, Recent
 
 
 def test_a_complaint_clears_when_nothing_new_has_come_for_some_seconds() -> None:
-    """It is said at once, goes on while its count grows, is over within 10 s after that, and begins anew with the next one."""
+    """It is reported at once, continues while its count grows, ends within 10 s after that, and starts again with the next one."""
     recent = Recent()
     assert not recent.goes_on("refused", 0, 0.0)
     assert recent.goes_on("refused", 1, 1.0) and recent.goes_on("refused", 1, 1.0 + CLEARS - 0.1)

@@ -1,4 +1,4 @@
-"""Replay of a bag: what the identifier heard live, it hears again, whatever was wrong with the streams."""
+"""Replay of a bag: the identifier gets the same data as live, with any fault of the streams."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RATE, ROWS = 2000.0, 20
 
 
 def messages(seed: int, samples: int) -> list[tuple[Quantity, Block]]:
-    """Voltage and position in the order in which they came: late, twice, spoilt, and counted anew from 0 at the end."""
+    """Voltage and position in their order of arrival: late, twice, spoilt, and with a counter that restarts at the end."""
     random = np.random.default_rng(seed)
     found: list[tuple[float, Quantity, Block]] = []
     for start, length in ((0, samples), (samples, samples // 2)):

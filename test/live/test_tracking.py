@@ -18,7 +18,7 @@ def run(frequencies: list[float], error: float = 0.05) -> list[Track]:
 
 
 def test_a_moved_resonance_raises_the_alarm_after_confirmation() -> None:
-    """One fit that is away may be chance, the second is not."""
+    """One deviating fit may be chance, the second is not."""
     tracks = run([47.0] * 20 + [46.0] * 3)
     assert not any(t.alarm for t in tracks[: 20 + CONFIRM - 1])
     assert tracks[20 + CONFIRM - 1].alarm
@@ -27,7 +27,7 @@ def test_a_moved_resonance_raises_the_alarm_after_confirmation() -> None:
 
 
 def test_scatter_within_the_interval_raises_no_alarm() -> None:
-    """A thousand fits of a resonance that stays: no alarm at four standard errors with confirmation."""
+    """A thousand fits of an unchanged resonance: no alarm at four standard errors with confirmation."""
     scatter = np.random.default_rng(0).normal(47.0, 0.05, 1000)
     assert not any(t.alarm for t in run(scatter.tolist()))
 
@@ -40,7 +40,7 @@ def test_the_alarm_ends_when_the_resonance_is_back() -> None:
 
 
 def test_the_reference_does_not_follow_a_slow_drift() -> None:
-    """The reference is what the machine was like at first, so that creeping is seen."""
+    """The reference is the first state of the machine, so that slow drift is detected."""
     tracks = run([47.0] * 40 + np.linspace(47.0, 45.5, 60).tolist())
     assert tracks[-1].alarm
     assert tracks[-1].reference is not None

@@ -1,4 +1,4 @@
-"""What goes on the wire: labels, sizes and strides of arrays, names and levels of statuses."""
+"""Content of ROS messages: labels, sizes and strides of arrays, names and levels of statuses."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def dimensions(message: Any) -> list[tuple[str, int, int]]:
 
 @pytest.mark.parametrize(("axes", "rows"), [(("x", "y"), 20), (("größe",), 1), (("a", "b", "c"), 0)])
 def test_a_block_and_a_table_of_the_same_numbers_are_one_message(axes: tuple[str, ...], rows: int) -> None:
-    """Rows of named columns, row-major, whoever sends them; and back without a loss."""
+    """Rows of named columns, row-major, for any sender; and back without loss."""
     from xy_sysid.nodes.convert import array_from_ros, array_to_ros, from_message, to_message
 
     random = np.random.default_rng(rows)
@@ -34,7 +34,7 @@ def test_a_block_and_a_table_of_the_same_numbers_are_one_message(axes: tuple[str
 
 
 def test_an_array_of_parts_has_the_size_of_each_as_its_stride() -> None:
-    """A transfer function: numerator, denominator and delay, one after the other."""
+    """A transfer function: numerator, denominator and delay in sequence."""
     from xy_sysid.nodes.convert import array_from_ros, array_to_ros
 
     message = array_to_ros(ArrayMessage("t", ("numerator", "denominator", "delay"), (2, 3, 1), np.arange(6.0)))
@@ -44,7 +44,7 @@ def test_an_array_of_parts_has_the_size_of_each_as_its_stride() -> None:
 
 
 def test_a_status_carries_level_sentence_values_and_hardware() -> None:
-    """A node's own status names the node as its hardware, others what they are told."""
+    """A node's own status has the node as its hardware id, others the given one."""
     from xy_sysid.nodes.convert import status, status_to_ros
 
     own, other = status("excitation", 1, "a sentence", {"a (V)": "1"}), status_to_ros(StatusMessage("axis x", STALE, "s", ()), "identifier")

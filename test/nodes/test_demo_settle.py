@@ -18,7 +18,7 @@ pytestmark = [needs_ros, pytest.mark.skipif(not os.environ.get("XY_SYSID_LONG_TE
 
 
 def test_the_demo_settles_what_pulls_the_arm_back_and_its_bags_replay_the_decisions(tmp_path: Path) -> None:
-    """It ends by itself with exit code 0, names gravity after experiments within the budget, and ``next --replay`` decides the same."""
+    """It ends by itself with exit code 0, names gravity after experiments within the budget, and ``next --replay`` gives the same decisions."""
     domain = new_domain()
     words = [sys.executable, "-m", "xy_sysid", "demo", "--settle", "--no-page", "--json", "--speed", "0"]
     environment = bare(ROS_DOMAIN_ID=str(domain), TMPDIR=str(tmp_path))

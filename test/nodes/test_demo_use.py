@@ -1,4 +1,4 @@
-"""xy-sysid demo --use without a page, over DDS: from the first samples to a path that is followed better with each feedforward."""
+"""xy-sysid demo --use without a page, over DDS: from the first samples to a path with a smaller error for each feedforward."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytestmark = [needs_ros, pytest.mark.skipif(not os.environ.get("XY_SYSID_LONG_TE
 
 
 def test_the_demo_identifies_the_table_and_follows_a_path_better_with_each_feedforward(tmp_path: Path) -> None:
-    """It ends by itself with exit code 0; on both axes kS, kV and kA halve the error of the PID, and the compensation leaves a fifth of that."""
+    """It ends by itself with exit code 0; on both axes kS, kV and kA halve the error of the PID, and the compensation to a fifth of that."""
     domain = new_domain()
     words = [sys.executable, "-m", "xy_sysid", "demo", "--use", "--no-page", "--json"]
     environment = bare(ROS_DOMAIN_ID=str(domain), TMPDIR=str(tmp_path))

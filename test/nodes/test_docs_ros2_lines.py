@@ -1,6 +1,6 @@
-"""The lines of the documents that begin with ``ros2``: what they name is there, with the type they say, when the documented programs run.
+"""The lines of the documents that begin with ``ros2``: their topics and services exist with the given types while the documented programs run.
 
-The ros2 command itself is no wheel. What it would ask for is asked for here: lifecycle, service and parameter calls, topics with their types.
+The ros2 command is not available as a wheel. The test makes its calls: lifecycle, services and parameters, topics with their types.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ELSEWHERE = ("run", "bag")  # programs of other packages
 
 
 def lines(*verbs: str) -> list[list[str]]:
-    """The words of every documented ros2 command that begins so."""
+    """The words of every documented ros2 command with this start."""
     text = "\n".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in PAGES)
     found = [shlex.split(line, comments=True)[1:] for line in re.findall(r"^    (ros2 .*)$", text, re.MULTILINE)]
     assert {words[0] for words in found} <= {"lifecycle", "topic", "service", "param", *ELSEWHERE}
@@ -33,7 +33,7 @@ def lines(*verbs: str) -> list[list[str]]:
 
 
 def filled(message: Any, values: Mapping[str, Any]) -> None:
-    """Every key is a field of the message, as ``ros2 topic pub`` wants it. Raises AttributeError for one that is none."""
+    """Fill a message like ``ros2 topic pub``: every key must be a field. Raises AttributeError for any other key."""
     for name, value in values.items():
         own = getattr(message, name)
         if isinstance(value, Mapping):
@@ -41,9 +41,9 @@ def filled(message: Any, values: Mapping[str, Any]) -> None:
 
 
 def test_what_the_documents_type_is_there_when_the_documented_programs_run(tmp_path: Path) -> None:
-    """The stand-in and the run file of ros2-control.md: transitions, calls and parameters do what is said; topics have their types.
+    """The stand-in and the run file of ros2-control.md: transitions, calls and parameters work as documented; topics have their types.
 
-    The watchdog alone is longer than in the file: a stall of a busy test machine would stop the excitation before it is asked to.
+    Only the watchdog is longer than in the file: a stall of a busy computer would stop the excitation too early.
     """
     from std_srvs.srv import Trigger
 
@@ -88,7 +88,7 @@ def test_what_the_documents_type_is_there_when_the_documented_programs_run(tmp_p
 
 
 def test_the_trajectory_that_is_published_has_the_fields_of_the_message(tmp_path: Path) -> None:
-    """excite.yaml of ``xy-sysid trajectory``, as documented: what ``ros2 topic pub`` makes of it is a JointTrajectory."""
+    """excite.yaml of ``xy-sysid trajectory``, as documented: ``ros2 topic pub`` can publish it as a JointTrajectory."""
     from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
     text = (ROOT / "docs" / "ros2-control.md").read_text(encoding="utf-8")

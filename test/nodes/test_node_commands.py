@@ -28,7 +28,7 @@ OF_INTERFACE: dict[str, dict[str, float]] = {
 
 
 def excitation(world: World, interface: str, **more: Any) -> NodeProcess:
-    """The node as docs/ros2-control.md sets it, with a patient watchdog for busy test machines."""
+    """The node as in docs/ros2-control.md, with a long watchdog for busy computers."""
     parameters = {
         "axes": '["x"]',
         "output": "commands",
@@ -48,7 +48,7 @@ def controller(world: World, interface: str, **more: Any) -> NodeProcess:
 
 
 def commands(world: World, topic: str = COMMANDS) -> list[Any]:
-    """A list that fills with what a controller hears."""
+    """A list that fills with the commands to a controller."""
     from std_msgs.msg import Float64MultiArray
 
     return world.hears(Float64MultiArray, topic, 1000)
@@ -78,12 +78,12 @@ def value(statuses: list[Any], name: str, key: str) -> str:
 
 
 def test_a_robot_with_a_forward_controller_is_identified_and_its_effect_named(world: World) -> None:
-    """The steps of docs/ros2-control.md alone, with the run file that comes along: response in rad and N m, friction named."""
+    """Only the steps of docs/ros2-control.md, with its run file: response in rad and N m, friction named."""
     from std_srvs.srv import Trigger
 
     text = (ROOT / "config" / "ros2_control.yaml").read_text()
     run_file = world.folder / "my_joint.yaml"
-    text = text.replace("rate: 200.0", "rate: 200.0\n      watchdog: 2.0")  # for busy test machines, as the shorter memory
+    text = text.replace("rate: 200.0", "rate: 200.0\n      watchdog: 2.0")  # for busy computers, like the shorter memory
     text = text.replace("tolerance: 0.01", "tolerance: 0.01\n      minimum: 6.0")
     run_file.write_text(text.replace("      topics:", f"      output: {world.folder / 'bag'}\n      topics:"))
     controller(world, "effort", effects='["coulomb_friction"]', joints='["shoulder_pan_joint"]')
@@ -95,8 +95,8 @@ def test_a_robot_with_a_forward_controller_is_identified_and_its_effect_named(wo
     assert world.until(lambda: int(value(statuses, "axis x", "windows") or 0) >= 10, 90.0), robot.output()
     assert world.until(lambda: bool(value(statuses, "axis x", "gain (rad/s/(N m))")), 30.0), robot.output()
     delay = float(value(statuses, "axis x", "delay (s)"))
-    assert 0.001 < delay < 0.005  # the machine's own is 2.3 ms; friction bends the response
-    for _ in range(24):  # a busy test machine misses cycles: six seconds without a gap are needed, and the watchdog may end the drive
+    assert 0.001 < delay < 0.005  # the machine's delay is 2.3 ms; friction distorts the response
+    for _ in range(24):  # a busy computer misses cycles: six seconds without a gap are needed, and the watchdog may end the drive
         answer = world.call(Trigger, "/xy/diagnoser/diagnose", Trigger.Request(), 120.0)
         if "coulomb_friction" in answer.message:
             break
@@ -110,7 +110,7 @@ def test_a_robot_with_a_forward_controller_is_identified_and_its_effect_named(wo
 
 
 def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(world: World) -> None:
-    """A position controller that a load disturbs: the reference as instrument gives the joint's gain within its error; H1 tells otherwise."""
+    """A position controller with a disturbing load: the reference as instrument gives the joint's gain within its error; H1 is wrong."""
     closed = {
         "axes": '["x"]',
         "source": "joint_state",
@@ -141,32 +141,32 @@ def test_a_servo_under_load_is_identified_in_closed_loop_while_data_come_in(worl
     wanted = ("gain 95 % low", "gain (rad/s/(N m))", "gain 95 % high")
     assert world.until(lambda: all(value(right, "axis x", key) for key in wanted) and bool(value(biased, "axis x", wanted[1])), 30.0)
     low, gain, high = (float(value(right, "axis x", key)) for key in wanted)
-    assert abs(gain - 3.0) < 3.5 / 3.92 * (high - low) and high - low < 6.0, (low, gain, high)  # 3.5 standard errors: one in 2000 is further off
+    assert abs(gain - 3.0) < 3.5 / 3.92 * (high - low) and high - low < 6.0, (low, gain, high)  # 3.5 standard errors: one in 2000 is larger
 
     def apart() -> float:
-        """rms over the lines of the difference between both responses, over their sigmas: 1 if they tell the same."""
+        """rms over the lines of the difference between both responses, over their sigmas: 1 if they agree."""
         one, other = (np.array(heard[-1].data).reshape(-1, 5) for heard in (instrument, naive))
         same, first, second = np.intersect1d(one[:, 0], other[:, 0], return_indices=True)
         used = (same > 2.0) & (same < 60.0)
         gap = np.abs((one[first] - other[second])[:, 1] + 1j * (one[first] - other[second])[:, 2]) ** 2
         return float(np.sqrt(np.mean((gap / (one[first, 4] ** 2 + other[second, 4] ** 2))[used])))
 
-    assert world.until(lambda: bool(instrument and naive) and apart() > 1.5, 60.0), apart()  # the more windows, the further
+    assert world.until(lambda: bool(instrument and naive) and apart() > 1.5, 60.0), apart()  # the difference grows with the number of windows
 
 
 @pytest.mark.parametrize("interface", ["effort", "velocity", "position"])
 def test_the_last_command_is_what_is_safe(world: World, interface: str) -> None:
-    """0 for effort and velocity, a measured position for position; one number a joint, counted at the controller's rate; then inactive."""
+    """0 for effort and velocity, a measured position for position; one number per joint, at the controller's rate; then inactive."""
     control = controller(world, interface)
     heard, seen, blocks = commands(world), states(world), world.blocks("voltage" if interface == "effort" else "reference")
-    faint = {"x.rms": 0.1} if interface == "effort" else {}  # so that no guard takes a busy machine's late commands for a wrong sign
+    faint = {"x.rms": 0.1} if interface == "effort" else {}  # so that no guard mistakes late commands of a busy computer for a wrong sign
     drive = excitation(world, interface, autostart=True, duration=3.0, **faint)
     assert world.until(lambda: "inactive: the duration of 3 s is over" in drive.output(), 60.0), drive.output() + control.output()
     world.spin(0.3)
     sent = np.array([message.data[0] for message in heard])
     assert all(len(message.data) == 1 and not message.layout.dim for message in heard)
     seq = np.concatenate([block.seq for block in blocks])
-    stamps = np.concatenate([block.time for block in blocks])  # a busy machine misses cycles: seq counts them, too
+    stamps = np.concatenate([block.time for block in blocks])  # a busy computer misses cycles: seq counts them, too
     assert len(seq) > 100 and blocks[0].axes == ("x",)
     assert np.median(np.diff(seq) / np.diff(stamps)) == pytest.approx(RATE, rel=0.02)
     assert set(sent[-3:]) == {sent[-1]} and np.std(sent) > 0
@@ -176,7 +176,7 @@ def test_the_last_command_is_what_is_safe(world: World, interface: str) -> None:
 
 
 def test_a_controller_of_more_joints_gets_one_number_each_in_its_order(world: World) -> None:
-    """controller_joints: the order of controllers.yaml; joints that are no axis get 0, or where positions are sent the place they are at."""
+    """controller_joints: the order of controllers.yaml; joints that are not axes get 0, or for positions their present one."""
     from sensor_msgs.msg import JointState
 
     publisher = world.node.create_publisher(JointState, "/joint_states", 10)
@@ -196,7 +196,7 @@ def test_a_controller_of_more_joints_gets_one_number_each_in_its_order(world: Wo
 
 
 def test_another_publisher_of_commands_is_refused(world: World) -> None:
-    """Two must not drive one controller: configure names the other one. And axes do not change after the start."""
+    """Two must not drive one controller: configure names the other node. Axes do not change after the start."""
     from std_msgs.msg import Float64MultiArray
 
     world.node.create_publisher(Float64MultiArray, COMMANDS, 10)
@@ -210,13 +210,13 @@ def test_another_publisher_of_commands_is_refused(world: World) -> None:
 
 
 def test_blocks_are_not_sent_where_a_controller_listens(world: World) -> None:
-    """A block topic remapped onto a command topic would send counters as efforts: refused, unless told that blocks are expected there."""
+    """A block topic remapped onto a command topic would send counters as efforts: refused, unless a parameter expects blocks there."""
     remap = ("-r", f"voltage:={COMMANDS}")
     drive = world.start(EXCITATION, {}, arguments=remap)
     assert world.transition("excitation", "configure")
     assert not world.transition("excitation", "activate")
     assert "would go to" in drive.output() and "output to commands" in drive.output()
-    drive.process.terminate()  # one that is killed would be taken for another excitation for 20 s
+    drive.process.terminate()  # a killed one would look like another excitation for 20 s
     assert drive.wait() == 0
     told = world.start(EXCITATION, {"renamed": True, "patience": 0.5}, arguments=remap)
     assert world.until(lambda: "unconfigured" in told.output())
@@ -225,7 +225,7 @@ def test_blocks_are_not_sent_where_a_controller_listens(world: World) -> None:
 
 
 def test_joint_states_without_the_joint_are_named(world: World) -> None:
-    """A joint that is not among the joint states: the log says which there are, and activation ends with the reason."""
+    """A joint that is missing in the joint states: the log lists the existing ones, and activation ends with the reason."""
     controller(world, "effort")
     drive = excitation(world, "effort", joints='["x=pan-2"]', patience=2.0, autostart=True)
     assert world.until(lambda: "no pan-2 among gripper, pan-1" in drive.output() and "inactive: no answer" in drive.output(), 60.0), drive.output()

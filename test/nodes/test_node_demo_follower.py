@@ -1,4 +1,4 @@
-"""The demo's own controller over real DDS: it takes models from stories, stops at STOP, and the tracking error falls on the simulated machine."""
+"""The controller of the demo over real DDS: it uses models of stories, stops at STOP, and the tracking error falls on the simulated machine."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def story(axis: str) -> str:
 
 
 def test_the_tracking_error_falls_from_pid_to_feedforward_to_compensation(world: World, tmp_path: Path) -> None:
-    """Without a story it refuses. With models of a machine with dry friction kS, kV and kA halve the PID's error, and a tenth is left."""
+    """Without a story it refuses. For a machine with dry friction kS, kV and kA halve the PID's error, and the compensation leaves a tenth."""
     file = tmp_path / "rubbing.yaml"
     file.write_text(MACHINE.format(base=ROOT / "config" / "machines" / "rigid.yaml"), encoding="utf-8")
     world.start("xy_sim.node", {"machine": str(file)})
@@ -53,13 +53,13 @@ def test_the_tracking_error_falls_from_pid_to_feedforward_to_compensation(world:
     def refused() -> Trigger.Response:
         return world.call(Trigger, "demo_follower/use", Trigger.Request(), 20.0, 3)
 
-    assert world.until(lambda: "Press Diagnose" in refused().message, 30.0), refused()  # until it has heard that the machine is the simulated one
+    assert world.until(lambda: "Press Diagnose" in refused().message, 30.0), refused()  # until it knows that the machine is the simulated one
     assert not refused().success
     for axis in TRUTH:
         world.node.create_publisher(String, f"story/{axis}", LATCHED_QOS).publish(String(data=story(axis)))
     drive, rows = world.node.create_publisher(Float64MultiArray, "voltage", DATA_QOS), np.arange(20.0)
     assert world.until(lambda: drive.get_subscription_count() > 1)
-    drive.publish(to_message(Block(("x", "y"), rows, rows / 2000, np.zeros((20, 2)))))  # as the excitation ends: now it is known where the axes are
+    drive.publish(to_message(Block(("x", "y"), rows, rows / 2000, np.zeros((20, 2)))))  # as at the end of the excitation: positions are now known
     assert world.until(lambda: bool(positions))
     assert world.until(lambda: world.call(Trigger, "demo_follower/use", Trigger.Request(), 20.0, 3).success, 20.0)
 

@@ -1,4 +1,4 @@
-"""Node diagnoser over real DDS: name the hidden effect, set it, watch the error fall; refusals, cancelling, the end."""
+"""Node diagnoser over real DDS: name the hidden effect, set it, check the falling error; refusals, cancelling, the end."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def trigger(world: World, name: str, seconds: float = 60.0, times: int = 1) -> t
 
 
 class Results:
-    """The newest of each latched topic."""
+    """The newest message of each latched topic."""
 
     def __init__(self, world: World) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
@@ -134,7 +134,7 @@ class Sender:
 
 
 def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
-    """Nothing heard, too little, an effect set before there are data, a wrong name, cancelling, and data heard all the while."""
+    """No data, too few data, an effect set before there are data, a wrong name, cancelling, with data received all the time."""
     results, statuses = Results(world), world.statuses()
     node = world.start(DIAGNOSER)
     sender = Sender(world, friction())
@@ -175,7 +175,7 @@ def test_what_lacks_is_said_and_the_model_waits_for_data(world: World) -> None:
 
 
 def test_a_resonance_is_found_alone_then_by_steps_after_a_reset(world: World) -> None:
-    """auto adds it; add_next goes on from a model that has it; after reset_model both find the same again, from the rigid model."""
+    """auto adds it; add_next continues from a model with it; after reset_model both find the same again, from the rigid model."""
     results, statuses = Results(world), world.statuses()
     node = world.start(DIAGNOSER)
     Sender(world, recorded("x:base_resonance+x:coulomb_friction", seconds=12.0, axes=("x", "y"))).send(0, 24_000)
@@ -212,7 +212,7 @@ def test_a_resonance_is_found_alone_then_by_steps_after_a_reset(world: World) ->
 
 
 def test_joint_states_and_an_effect_of_ones_own(world: World, tmp_path: Path) -> None:
-    """Joints by name, effort as input, parameters effects.<joint>, and a file with an effect that the library has not."""
+    """Joints by name, effort as input, parameters effects.<joint>, and a file with an effect that is not in the library."""
     from sensor_msgs.msg import JointState
 
     own = tmp_path / "mains_hum.py"

@@ -1,4 +1,4 @@
-"""Node excitation over real DDS: nothing before activate, zero volts last however it ends, lockstep bit for bit."""
+"""Node excitation over real DDS: no motion before activate, zero volts last at any end, lockstep bit for bit."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def moving(blocks: list[Block]) -> bool:
 
 @needs_ros
 def test_nothing_before_activate_and_zero_after_deactivate(world: World) -> None:
-    """Lifecycle: not one block before `activate`; after `deactivate` the last block is zeros; and it can go again."""
+    """Lifecycle: no block before `activate`; after `deactivate` the last block is zeros; and it can be activated again."""
     blocks = world.blocks()
     world.machine(Integrator())
     process = world.start(MODULE, {"watchdog": 2.0, "ramp": 0.1})
@@ -79,7 +79,7 @@ def test_nothing_before_activate_and_zero_after_deactivate(world: World) -> None
 @needs_ros
 @pytest.mark.parametrize(("number", "lockstep"), [(signal.SIGINT, False), (signal.SIGTERM, True)])
 def test_a_signal_ends_at_zero_volts(world: World, number: signal.Signals, lockstep: bool) -> None:
-    """Zero volts is the last thing published on Ctrl-C and SIGTERM; the exit is clean, and a second Ctrl-C changes nothing."""
+    """Zero volts is the last published value on Ctrl-C and SIGTERM; the exit is clean, and a second Ctrl-C changes nothing."""
     blocks = world.blocks()
     world.machine(Integrator())
     process = world.start(MODULE, {"watchdog": 2.0, "ramp": 0.2, "lockstep": lockstep})
@@ -99,7 +99,7 @@ def test_a_signal_ends_at_zero_volts(world: World, number: signal.Signals, locks
 
 @needs_ros
 def test_positions_that_stop_trip_the_watchdog(world: World) -> None:
-    """Encoder watchdog: ramp to zero, go inactive, say why in the log and in the metrics."""
+    """Encoder watchdog: ramp to zero, inactive, with the reason in the log and in the metrics."""
     blocks, statuses = world.blocks(), world.statuses()
     world.machine(Integrator(blocks=60))
     process = world.start(MODULE, {"watchdog": 0.3, "ramp": 0.0})
@@ -115,7 +115,7 @@ def test_positions_that_stop_trip_the_watchdog(world: World) -> None:
 
 @needs_ros
 def test_a_machine_that_never_answers_is_named(world: World) -> None:
-    """When the machine never answers: says so, at 0 V, and goes inactive."""
+    """If the machine never answers: inactive at 0 V, with the reason."""
     blocks = world.blocks()
     process = world.start(MODULE, {"patience": 0.4, "lockstep": True})
     activate(world)
@@ -128,7 +128,7 @@ def test_a_machine_that_never_answers_is_named(world: World) -> None:
 
 @needs_ros
 def test_a_machine_that_is_found_late_is_asked_again(world: World) -> None:
-    """In lockstep, a first block that nobody heard, or whose answer nobody heard, is followed by another zero, not by silence for ever."""
+    """In lockstep, if the first block or its answer is lost, another zero block follows instead of endless silence."""
     blocks = world.blocks()
     world.start(MODULE, {**LOCKSTEP, "patience": 20.0})
     activate(world)
@@ -171,7 +171,7 @@ def test_lockstep_is_bit_for_bit_what_the_drive_makes_of_the_positions(world: Wo
 @needs_ros
 @pytest.mark.parametrize("where", ["Drive.tick", "Drive.next"])
 def test_an_error_of_its_own_ends_at_zero_volts(world: World, where: str) -> None:
-    """Zero volts is the last thing published on an error, even one in the very place that makes the voltage; it is not hidden."""
+    """Zero volts is the last published value after an error, even one in the computation of the voltage; the error is reported."""
     blocks = world.blocks()
     world.machine(Integrator())
     code = f"""
@@ -196,7 +196,7 @@ sys.exit(main())
 
 @needs_ros
 def test_a_transition_that_is_not_allowed_is_refused_and_ends_nothing(world: World) -> None:
-    """configure (1), cleanup (2) and others that one that drives has not, by number as other tools ask for it: refused, and it drives on."""
+    """configure (1), cleanup (2) and other transitions that an active node does not have, by number: refused, and it continues to drive."""
     from lifecycle_msgs.msg import Transition
     from lifecycle_msgs.srv import ChangeState
 
@@ -227,14 +227,14 @@ def test_real_time_is_kept_without_drift(world: World) -> None:
     world.spin(2.0)
     due = 100.0 * (time.monotonic() - began)
     seq = np.concatenate([block.seq for block in blocks])
-    assert due - 10 <= (seq[-1] - before) / 20 <= due + 10  # also of blocks that were lost on the way here
+    assert due - 10 <= (seq[-1] - before) / 20 <= due + 10  # also of lost blocks
     lost = (seq[-1] - seq[0] + 1) / 20 - len(blocks)
     assert (np.diff(seq) > 0).all() and lost < 100
 
 
 @needs_ros
 def test_parameters_change_live_or_are_refused_with_a_sentence(world: World) -> None:
-    """rms and limits live; the rest only while inactive; limits and spelling are checked."""
+    """rms and limits change live; other settings only while inactive; limits and spelling are checked."""
     blocks = world.blocks()
     world.machine(Integrator())
     process = world.start(MODULE, {**LOCKSTEP, "speed": 1.0, "ahead": 1})
@@ -266,7 +266,7 @@ def test_parameters_change_live_or_are_refused_with_a_sentence(world: World) -> 
     ],
 )
 def test_a_wrong_parameter_is_one_line_and_exit_code_2(world: World, name: str, value: object, words: str) -> None:
-    """Unknown names give the nearest spelling, values what is allowed; no traceback."""
+    """Unknown names give the nearest spelling, wrong values the allowed range; no traceback."""
     process = world.start(MODULE, {name: value})
     assert process.wait() == 2
     lines = [line for line in process.output().splitlines() if "[rcl]" not in line]
@@ -275,7 +275,7 @@ def test_a_wrong_parameter_is_one_line_and_exit_code_2(world: World, name: str, 
 
 @needs_ros
 def test_axes_can_be_named_and_a_signal_that_does_not_fit_is_refused(world: World) -> None:
-    """Axes come from the parameter `axes`; configure fails with a sentence when a signal does not fit the rate."""
+    """Axes come from the parameter `axes`; configure fails with a sentence if a signal does not fit the rate."""
     blocks = world.blocks()
     process = world.start(MODULE, {"axes": '["a"]', "a.high": 900, "rate": 1000.0})
     assert not world.transition("excitation", "configure")
@@ -290,7 +290,7 @@ def test_axes_can_be_named_and_a_signal_that_does_not_fit_is_refused(world: Worl
 
 @needs_ros
 def test_broken_positions_do_not_crash_it(world: World) -> None:
-    """NaN, wrong columns and wrong sizes count as no position."""
+    """NaN, wrong columns and wrong sizes do not count as positions."""
     from std_msgs.msg import Float64MultiArray
 
     from xy_sysid.nodes.common import DATA_QOS
@@ -317,7 +317,7 @@ def test_broken_positions_do_not_crash_it(world: World) -> None:
 
 
 def test_without_ros_it_says_in_one_line_what_to_install() -> None:
-    """An extra [ros] brings the wheels; without it a node says in one line what to install."""
+    """The extra [ros] installs the wheels; without it a node says in one line what to install."""
     code = "import sys; sys.modules['rclpy'] = None; from xy_sysid.nodes.excitation import main; sys.exit(main())"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=30, check=False)
@@ -327,7 +327,7 @@ def test_without_ros_it_says_in_one_line_what_to_install() -> None:
 
 @needs_ros
 def test_what_drives_is_there_at_once() -> None:
-    """The node that drives and what starts all nodes need no compiler; what hears the machine needs no scipy.signal (half a second)."""
+    """The driving node and the starter need no compiler; the receiving nodes need no scipy.signal (half a second)."""
     modules = {"nodes.excitation_node": {"numba", "scipy.signal"}, "processes.starter": {"numba", "scipy"}, "live.identifier": {"scipy.signal"}}
     for module, heavy in modules.items():
         code = f"import sys, xy_sysid.{module}; print(*sorted({heavy!r} & set(sys.modules)))"
@@ -337,7 +337,7 @@ def test_what_drives_is_there_at_once() -> None:
 
 @needs_ros
 def test_a_designed_experiment_is_loaded_and_one_beyond_the_limits_is_refused(world: World, tmp_path: Path) -> None:
-    """Parameter experiment: at configure the file is checked against the node's own limits; refused, nothing can be activated."""
+    """Parameter experiment: configure checks the file against the node's limits; if refused, it cannot be activated."""
     loud, good = (tmp_path / name for name in ("loud.yaml", "good.yaml"))
     slow = AxisExcitation(kind="off", rms=0.0, slow=2.0, slow_period=3.0)
     for place, volts in ((loud, 12.0), (good, 2.0)):

@@ -1,4 +1,4 @@
-"""run --first over real DDS: an error in any thread of the conductor stops the drive, is one line, and never an exit code of 0."""
+"""run --first over real DDS: an error in any thread of the conductor stops the drive, with one line and never an exit code of 0."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ sys.exit(run(["run", "--first", "--params", sys.argv[1]]))
 
 @pytest.mark.parametrize("place", ["FirstRun.took", "Conductor._on_statuses", "FirstRun.summary"])
 def test_an_error_of_the_conductor_stops_the_drive_and_is_one_line(tmp_path: Path, place: str) -> None:
-    """While it pushes, in a callback, and after the last push: one line, exit code 1, zero volts last, no traceback."""
+    """During a step, in a callback, and after the last step: one line, exit code 1, zero volts last, no traceback."""
     (tmp_path / "run.yaml").write_text(RUN)
     for _ in range(3):
         said, code, blocks = _run_with_an_error(tmp_path, place)
-        if "without all its messages" not in said:  # on a busy computer the run gives up before it comes to that place
+        if "without all its messages" not in said:  # on a busy computer the run ends before it reaches that point
             break
     assert code == 1 and "Traceback" not in said, said
     assert len([line for line in said.splitlines() if "ZeroDivisionError: float division by zero" in line]) == 1, said
@@ -48,7 +48,7 @@ def test_an_error_of_the_conductor_stops_the_drive_and_is_one_line(tmp_path: Pat
 
 
 def _run_with_an_error(tmp_path: Path, place: str) -> tuple[str, int | None, list[Any]]:
-    """What the program says, its exit code, and the voltage that it sent."""
+    """Output of the program, its exit code, and the sent voltage."""
     with world_in(tmp_path) as world:
         blocks = world.blocks()
         environment = bare(ROS_DOMAIN_ID=str(world.domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")

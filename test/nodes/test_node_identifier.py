@@ -48,7 +48,7 @@ def arrays(world: World, topics: list[str]) -> dict[str, list[ArrayMessage]]:
 
 
 def test_live_recorded_and_replayed_are_the_same_bit_for_bit(world: World, tmp_path: Path) -> None:
-    """Machine, excitation, identifier and recorder as processes; the bag, replayed, gives every array that was published."""
+    """Machine, excitation, identifier and recorder as processes; a replay of the bag gives every published array."""
     statuses = world.statuses()
     bag = tmp_path / "bag"
     recorder = world.start(RECORDER, {"output": str(bag), "storage": "mcap"})
@@ -83,7 +83,7 @@ def test_live_recorded_and_replayed_are_the_same_bit_for_bit(world: World, tmp_p
 
 
 def recorded_arrays(bag: Path, topics: list[str]) -> Iterator[tuple[str, bytes]]:
-    """With plain rosbags, so that the bag is also proven to be one."""
+    """Read with rosbags, which also proves that the bag is valid."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -97,7 +97,7 @@ QUICK: dict[str, Any] = {"length": 1024, "numerator_order": 0, "denominator_orde
 
 
 def test_a_killed_identifier_goes_on_with_its_spectra(world: World, tmp_path: Path) -> None:
-    """kill -9 in the middle, start again: the windows of before are still counted and the fit goes on."""
+    """kill -9 and restart: the earlier windows are still counted and the fit continues."""
     statuses = world.statuses()
     state = tmp_path / "state.npz"
     settings = {**QUICK, "state_file": str(state), "save_every": 0.5}
@@ -120,7 +120,7 @@ def test_a_killed_identifier_goes_on_with_its_spectra(world: World, tmp_path: Pa
 
 
 def test_a_state_that_does_not_fit_is_kept_aside_in_words(world: World, tmp_path: Path) -> None:
-    """Neither used nor lost: the node says so and begins anew."""
+    """It is neither used nor lost: the node says so and starts without it."""
     statuses = world.statuses()
     state = tmp_path / "state.npz"
     state.write_bytes(b"not a state")
@@ -132,7 +132,7 @@ def test_a_state_that_does_not_fit_is_kept_aside_in_words(world: World, tmp_path
 
 
 def test_parameters_change_while_it_runs_and_wrong_ones_are_refused(world: World) -> None:
-    """Orders at once, window with a fresh start, limits in a sentence; services reset, save and load answer."""
+    """Orders change at once, the window with a new start, limits give a sentence; services reset, save and load answer."""
     from std_srvs.srv import Trigger
 
     statuses = world.statuses()
@@ -161,7 +161,7 @@ def test_parameters_change_while_it_runs_and_wrong_ones_are_refused(world: World
 
 
 def test_bad_messages_are_refused_in_words_and_nothing_crashes(world: World) -> None:
-    """Wrong columns, sizes that do not fit, NaN, a restart of the source: counted, said, and identification goes on."""
+    """Wrong columns, wrong sizes, NaN, a restart of the source: counted and reported, and identification continues."""
     from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
     from xy_sysid.nodes.convert import to_message
@@ -192,7 +192,7 @@ def test_bad_messages_are_refused_in_words_and_nothing_crashes(world: World) -> 
 
 @pytest.mark.parametrize("reliability", ["RELIABLE", "BEST_EFFORT"])
 def test_joint_states_are_paired_by_stamp_with_effort_as_input(world: World, reliability: str) -> None:
-    """A real machine's JointState, one sample a message, is identified like blocks, whatever reliability its driver offers."""
+    """JointState with one sample per message is identified like blocks, for any reliability of its publisher."""
     from rclpy.qos import QoSProfile, ReliabilityPolicy
     from sensor_msgs.msg import JointState
 
@@ -214,7 +214,7 @@ def test_joint_states_are_paired_by_stamp_with_effort_as_input(world: World, rel
         publisher.publish(message)
         if n % 100 == 0:
             world.spin(0.005)
-        if n % 500 == 499:  # the reader keeps up, so that best effort loses nothing on a busy machine either
+        if n % 500 == 499:  # the reader keeps up, so that best effort loses nothing on a busy computer either
             wanted.append(n - 500)
             world.until(lambda: int(newest(statuses, "streams").get("samples paired", "0")) > wanted[-1], 10.0)
     assert world.until(lambda: int(newest(statuses, "axis elbow").get("windows", "0")) >= 25, 60.0), node.output()
@@ -224,7 +224,7 @@ def test_joint_states_are_paired_by_stamp_with_effort_as_input(world: World, rel
 
 
 def test_joint_states_in_ros_time_are_paired_with_the_voltage_of_the_excitation(world: World) -> None:
-    """One clock: block of one row, joints of any spelling mapped to axes; a driver with a clock of its own is named and never OK."""
+    """One clock: blocks of one row, joints of any spelling mapped to axes; a driver with another clock is reported and never OK."""
     from sensor_msgs.msg import JointState
     from std_msgs.msg import Float64MultiArray
 
@@ -262,7 +262,7 @@ def test_joint_states_in_ros_time_are_paired_with_the_voltage_of_the_excitation(
     assert world.until(lambda: int(newest(statuses, "streams")["samples paired"]) > 500, 20.0), newest(statuses, "streams")
 
     def rate_is_known() -> bool:
-        """It is that of the excitation's own clock, up to what its slips, where it was starved, do to the slope of a line through 5 s."""
+        """The rate is that of the excitation's clock, up to the effect of its stalls on the slope of a line through 5 s."""
         counted, times = np.array(sent).T
         slips = float(np.ptp(times - counted / 100.0))
         return float(newest(statuses, "streams")["sampling rate (Hz)"]) == pytest.approx(100.0, rel=1e-6 + 3.0 * slips / 5.0)
@@ -284,14 +284,14 @@ def test_axes_of_any_spelling_start_and_alike_ones_are_refused_in_a_line(world: 
 
 
 def test_silence_is_said(world: World) -> None:
-    """Without any stream the node says what it does not hear."""
+    """Without any stream the node names the missing ones."""
     statuses = world.statuses()
     world.start(IDENTIFIER, QUICK)
     assert world.until(lambda: "no voltage and no position received" in newest(statuses, "streams").get("message", ""), 30.0)
 
 
 def test_a_recorder_killed_in_the_middle_leaves_a_readable_bag(world: World, tmp_path: Path) -> None:
-    """kill -9: what came up to two seconds before is there."""
+    """kill -9: all data older than two seconds are there."""
     recorder = world.start(RECORDER, {"output": str(tmp_path / "bag")})
     source = Source(world)
     assert world.until(source.found, 30.0)
@@ -321,7 +321,7 @@ def test_wrong_parameters_end_in_one_line(module: str, arguments: list[str], wor
 
 
 def test_unpaired_reference(tmp_path: Path) -> None:
-    """A bag made block by block reads back as it was sent."""
+    """A bag written block by block is read unchanged."""
     with BagWriter(tmp_path / "bag") as writer:
         for start in range(0, 400, 20):
             seq = np.arange(start, start + 20, dtype=float)

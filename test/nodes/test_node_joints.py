@@ -1,4 +1,4 @@
-"""Two joints called pan and joint-2, in any order, from joint states to every place where an axis is named, over real DDS."""
+"""Two joints named pan and joint-2, in any order, from joint states to every use of an axis name, over real DDS."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ JOINT = {"rms": 1.0, "limit": 2.0, "centring": 0.5, "velocity_gain": 3.0, "break
 
 
 def files(folder: Path) -> tuple[Path, Path]:
-    """A machine of two joints, and the parameters of all nodes: names that no command line would take."""
+    """A machine of two joints, and the parameters of all nodes, with names that a command line cannot accept."""
     joint = yaml.safe_load((ROOT / "config" / "machines" / "joint.yaml").read_text(encoding="utf-8"))
     machine, parameters = folder / "machine.yaml", folder / "nodes.yaml"
-    wide = {**joint["axes"]["x"], "travel": 100.0}  # where a busy machine stalls, the stand-in goes on with its last effort
+    wide = {**joint["axes"]["x"], "travel": 100.0}  # on a stall of a busy computer, the stand-in continues with its last effort
     machine.write_text(yaml.safe_dump({**joint, "axes": {"pan": wide, "joint-2": wide}}))
     drives = {"axes": AXES, "output": "commands", "unit": "rad", "joint_topic": "/joint_states", "controller_joints": ["pan", "joint-2"]}
     nodes = {
@@ -36,12 +36,12 @@ def files(folder: Path) -> tuple[Path, Path]:
         "recorder": {"output": str(folder / "bag"), "topics": ["/joint_states", "frf/.*", "metrics"]},
     }
     told = {f"/xy/{name}": {"ros__parameters": values} for name, values in nodes.items()}
-    parameters.write_text(json.dumps(told))  # YAML without aliases, which rcl does not know
+    parameters.write_text(json.dumps(told))  # YAML without aliases, which rcl does not support
     return machine, parameters
 
 
 def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Driven, identified, diagnosed, shown, recorded, replayed and diagnosed offline, each under its own name and in its own units."""
+    """Driven, identified, diagnosed, shown, recorded, replayed and diagnosed offline, each with its name and its units."""
     from std_srvs.srv import Trigger
 
     from xy_sysid.cli.monitor import Monitor
@@ -66,12 +66,12 @@ def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world
         halted: list[str] = []
 
         def driving() -> None:
-            """Again, where a guard of the drive took the stand-in's stalls on a busy machine for a fault of the encoder."""
+            """Drive again if a guard mistook stalls of the stand-in on a busy computer for an encoder fault."""
             if newest(statuses, "excitation").get("state") == "stopped":
                 halted.append("while it was diagnosed")
                 statuses.clear()
                 again = world.transition("excitation", "activate")
-                assert again or world.state("excitation") == "active", drive.output()  # the status was one of before
+                assert again or world.state("excitation") == "active", drive.output()  # an old status
 
         def all_there() -> bool:
             monitor.spin(0.01)
@@ -82,7 +82,7 @@ def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world
             return {"frf/joint_2", "frf/pan"} <= set(monitor.arrays)
 
         def near() -> bool:
-            """3 in truth; friction bends it, and so do the stand-in's stalls until enough has been measured between them."""
+            """The true value is 3; friction changes it, and so do stalls of the stand-in until enough data are between them."""
             driving()
             monitor.spin(0.01)
             return all(1.0 < float(newest(statuses, f"axis {axis}").get("gain (rad/s/(N m))", "nan")) < 4.0 for axis in AXES)
@@ -93,7 +93,7 @@ def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world
             assert heard.table("frf", axis) is not None and heard.units(f"axis {axis}") == ("N m", "rad")
         assert heard.axes() == ("joint-2", "pan") and heard.units("excitation") == ("N m", "rad")
         assert world.until(shown)
-        for _ in range(12):  # a busy test machine loses samples, and some seconds without a gap are needed
+        for _ in range(12):  # a busy computer loses samples, and some seconds without a gap are needed
             driving()
             answer = world.call(Trigger, "/xy/diagnoser/diagnose", Trigger.Request(), 120.0)
             if answer.message.count("Missing: coulomb_friction") == 2:
@@ -104,7 +104,7 @@ def test_two_joints_of_any_name_go_through_every_node_the_page_and_the_bag(world
         assert world.until(lambda: bool(newest(told, "axis joint-2")) and {"joint-2", "pan"} <= set(heard.stories))
         stood = halted or newest(statuses, "excitation").get("state") == "stopped"
         if stood or any(newest(statuses, f"axis {axis}").get("dropped windows", "0") != "0" for axis in AXES):
-            for _ in range(6):  # so that the bag has enough of an axis that moves
+            for _ in range(6):  # so that the bag has enough motion
                 driving()
                 world.spin(5.0)
         named = newest(told, "axis joint-2")

@@ -1,4 +1,4 @@
-"""What ROS expects of a node: quality of service that is obeyed, diagnostics that name it, descriptors, namespaces, remapped topics, a clock."""
+"""ROS conventions of a node: quality of service, diagnostics with its name, descriptors, namespaces, remapped topics, a clock."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ QUICK: dict[str, Any] = {"length": 512, "refit": 2.0, "reorder": 0.2, "numerator
 
 
 def test_qos_overrides_of_publishers_are_obeyed(world: World) -> None:
-    """Metrics that are latched by a parameter reach who comes late, as many as the depth says; the graph shows the same."""
+    """Metrics latched by a parameter reach late subscribers, up to the depth; the graph shows the same."""
     from diagnostic_msgs.msg import DiagnosticArray
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -49,7 +49,7 @@ def test_qos_overrides_of_publishers_are_obeyed(world: World) -> None:
 
 
 def test_qos_overrides_of_subscriptions_are_obeyed_and_not_overruled(world: World) -> None:
-    """A user who wants best effort gets it, although the publisher offers more."""
+    """A user can select best effort, although the publisher offers more."""
     from rclpy.qos import ReliabilityPolicy
     from std_msgs.msg import Float64MultiArray
 
@@ -74,7 +74,7 @@ def test_qos_overrides_of_subscriptions_are_obeyed_and_not_overruled(world: Worl
     ],
 )
 def test_a_wrong_override_is_one_line(name: str, value: str, words: str) -> None:
-    """Name, value, what is allowed; exit code 2."""
+    """Name, value, allowed values; exit code 2."""
     command = [sys.executable, "-m", EXCITATION, "--ros-args", "-p", f"qos_overrides./xy/{name}:={value}"]
     said = subprocess.run(command, capture_output=True, text=True, env=bare(), timeout=60, check=False, cwd=ROOT)
     lines = [line for line in said.stderr.splitlines() if "bringing up" not in line]
@@ -82,7 +82,7 @@ def test_a_wrong_override_is_one_line(name: str, value: str, words: str) -> None
 
 
 def test_two_tables_in_two_namespaces_are_told_apart(world: World) -> None:
-    """Each is driven by its own excitation alone, and on /diagnostics each name and hardware is there once."""
+    """Each is driven only by its own excitation, and on /diagnostics each name and hardware id appears once."""
     from diagnostic_msgs.msg import DiagnosticArray
 
     heard: dict[str, Any] = {}
@@ -103,12 +103,12 @@ def test_two_tables_in_two_namespaces_are_told_apart(world: World) -> None:
     names |= {"left/excitation", "left/identifier: axis x"}
     assert world.until(lambda: names <= set(heard) and streams("left") > 0, 60.0), sorted(heard)
     assert {one.hardware_id for one in heard.values()} == {"left", "right"}
-    assert all(one.level in (b"\x00", b"\x01", b"\x02") for one in heard.values())  # STALE is the aggregator's word
+    assert all(one.level in (b"\x00", b"\x01", b"\x02") for one in heard.values())  # STALE is reserved for the aggregator
     assert streams("right") == 0
 
 
 def test_topics_that_are_remapped_go_on_working(world: World) -> None:
-    """As SetRemap of a launch file writes it: every node under other names, and the effect is the same."""
+    """As by SetRemap of a launch file: every node with other topic names, with the same effect."""
     names = ["-r", "voltage:=drive/u", "-r", "position:=drive/y", "-r", "metrics:=told"]
     statuses = world.statuses("told")
     world.start(BALLSCREW, {"machine": "rigid.yaml"}, arguments=names)
@@ -120,7 +120,7 @@ def test_topics_that_are_remapped_go_on_working(world: World) -> None:
 
 
 def test_two_robots_with_joints_in_any_script_are_told_apart(world: World) -> None:
-    """Each robot in a namespace of its own, with a joint whose name has no Latin letter: identified under the axis' name, each from its own data."""
+    """Each robot in its own namespace, with a joint name without Latin letters: identified under the axis's name, each from its own data."""
     from sensor_msgs.msg import JointState
 
     joints = {"/left": "关节-2", "/right": "Шарнир Ä"}
@@ -146,7 +146,7 @@ def test_two_robots_with_joints_in_any_script_are_told_apart(world: World) -> No
 
 
 def test_the_name_of_a_joint_cannot_steer_the_terminal_of_a_node(world: World) -> None:
-    """A name from the network stands in the log, character by character."""
+    """The log shows a name from the network visibly, character by character."""
     from sensor_msgs.msg import JointState
 
     node = world.start(IDENTIFIER, {**QUICK, "source": "joint_state", "effort_as_voltage": True})
@@ -161,7 +161,7 @@ def test_the_name_of_a_joint_cannot_steer_the_terminal_of_a_node(world: World) -
 
 
 def test_with_use_sim_time_samples_are_stamped_by_the_clock_topic(world: World) -> None:
-    """Real processes: the excitation's samples and the identifier's diagnostics stand in the time of /clock, and drive on while it runs."""
+    """Real processes: the excitation's samples and the identifier's diagnostics use the time of /clock, and continue while it runs."""
     from builtin_interfaces.msg import Time
     from rosgraph_msgs.msg import Clock
 
@@ -176,7 +176,7 @@ def test_with_use_sim_time_samples_are_stamped_by_the_clock_topic(world: World) 
     world.node.create_timer(0.02, tick)
     world.machine(Integrator())
     blocks, statuses = world.blocks(), world.statuses()
-    world.start(IDENTIFIER, {**QUICK, "reorder": 2.0, "use_sim_time": True})  # a busy machine's blocks come late
+    world.start(IDENTIFIER, {**QUICK, "reorder": 2.0, "use_sim_time": True})  # blocks of a busy computer are late
     assert world.until(lambda: bool(newest(statuses, "streams")), 30.0)
     world.start(EXCITATION, {"use_sim_time": True, "autostart": True, "duration": 8.0, "watchdog": 5.0})
     assert world.until(lambda: newest(statuses, "excitation").get("state") == "stopped", 60.0)
@@ -185,7 +185,7 @@ def test_with_use_sim_time_samples_are_stamped_by_the_clock_topic(world: World) 
 
 
 def test_descriptors_say_what_may_be_set(world: World) -> None:
-    """Choices as additional constraints, numbers with ranges, and what is fixed for a running node as read only."""
+    """Choices as additional constraints, numbers with ranges, and fixed parameters of a running node as read-only."""
     from rcl_interfaces.srv import DescribeParameters
 
     world.start(IDENTIFIER, QUICK)
@@ -210,7 +210,7 @@ def test_descriptors_say_what_may_be_set(world: World) -> None:
 
 
 def test_a_lifecycle_manager_takes_it_through_all_states_and_back(world: World) -> None:
-    """As nav2's manager does, without a bond: configure, activate, deactivate, cleanup, and once more, then shutdown."""
+    """As by nav2's manager, without a bond: configure, activate, deactivate, cleanup, again, then shutdown."""
     world.machine(Integrator())
     process = world.start(EXCITATION)
     for _ in range(2):
@@ -222,14 +222,14 @@ def test_a_lifecycle_manager_takes_it_through_all_states_and_back(world: World) 
 
 @pytest.mark.parametrize("module", [EXCITATION, IDENTIFIER, DIAGNOSER, BALLSCREW])
 def test_every_node_says_when_it_is_ready(world: World, module: str) -> None:
-    """One line, after everything is compiled and subscribed: what a launch file can wait for."""
+    """One line after everything is compiled and subscribed, for which a launch file can wait."""
     node = world.start(module)
     assert world.until(lambda: "]: ready" in node.output(), 60.0), node.output()
     assert world.until(lambda: world.node.count_publishers("/xy/metrics") == 1)
 
 
 def test_an_excitation_that_starts_by_itself_waits_for_the_machine_however_long_it_takes(world: World) -> None:
-    """A machine that is there and silent for longer than patience is no end: it begins anew until the machine answers."""
+    """A present machine that is silent for longer than patience does not end the drive: it starts again until the machine answers."""
     machine = Integrator()
     machine.alive = False
     world.machine(machine)
@@ -243,7 +243,7 @@ def test_an_excitation_that_starts_by_itself_waits_for_the_machine_however_long_
 
 
 def test_joints_of_another_publisher_are_no_warning_and_a_fault_that_is_over_clears(world: World) -> None:
-    """A gripper's joint states on the same topic leave the level OK; a message without numbers is a WARN, for 10 s and no longer."""
+    """A gripper's joint states on the same topic keep the level OK; a message without numbers is a WARN for 10 s only."""
     import time
 
     from rclpy.duration import Duration
@@ -257,7 +257,7 @@ def test_joints_of_another_publisher_are_no_warning_and_a_fault_that_is_over_cle
 
     def publish(names: list[str], values: list[float]) -> None:
         message = JointState(name=names, position=values, effort=values)
-        message.header.stamp = (first + Duration(nanoseconds=sent[0] * 20_000_000)).to_msg()  # even, however busy the computer is
+        message.header.stamp = (first + Duration(nanoseconds=sent[0] * 20_000_000)).to_msg()  # evenly spaced, for any load of the computer
         topic.publish(message)
 
     def tick() -> None:
@@ -279,7 +279,7 @@ def test_joints_of_another_publisher_are_no_warning_and_a_fault_that_is_over_cle
 
 
 def test_a_simulated_machine_that_missed_some_voltage_says_so_for_ten_seconds(world: World) -> None:
-    """A hole in the counter of the voltage is a WARN, and is none any more within 10 s; the count stays."""
+    """A gap in the counter of the voltage is a WARN for at most 10 s; the count remains."""
     import time
 
     from std_msgs.msg import Float64MultiArray
@@ -312,7 +312,7 @@ def test_a_simulated_machine_that_missed_some_voltage_says_so_for_ten_seconds(wo
 
 @pytest.mark.parametrize("node", NODES)
 def test_no_range_of_a_descriptor_has_an_end_that_is_refused(node: str) -> None:
-    """Both ends of the range of every number of every node; what does not fit together with another setting is another matter."""
+    """Both ends of the range of every number of every node are accepted, except for conflicts with other settings."""
     from xy_sysid.nodes.common import describe
 
     refused = {}

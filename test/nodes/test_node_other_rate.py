@@ -1,4 +1,4 @@
-"""A reset makes everything new that a node learned from the joint states, over real DDS."""
+"""A reset clears everything that a node learned from the joint states, over real DDS."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NODES = {"identifier": ("reset", "streams"), "diagnoser": ("forget", "diagnoser"
 
 
 def test_after_a_reset_the_driver_may_have_another_rate(world: World) -> None:
-    """Half a minute at 250 Hz; after reset and forget, less than two seconds at 200 Hz are enough to know that."""
+    """Half a minute at 250 Hz; after reset and forget, the rate of 200 Hz is found within two seconds."""
     from sensor_msgs.msg import JointState
     from std_srvs.srv import Trigger
 

@@ -1,4 +1,4 @@
-"""Real processes over DDS: what happens to the machine when the excitation is killed, doubled, or its clock is taken away."""
+"""Real processes over DDS: reaction of the machine to an excitation that is killed, doubled, or without a clock."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def activate(world: World, node: str = "excitation") -> None:
 
 @pytest.mark.parametrize("watchdog", [0.05, 0.0])
 def test_kill_9_of_the_excitation_is_what_the_drive_makes_of_it(world: World, watchdog: float) -> None:
-    """Killed at 1 V: a drive with a watchdog lets the axis rest within 50 ms and 30 mm; one without runs into the end stop."""
+    """Killed at 1 V: a drive with a watchdog stops the axis within 50 ms and 30 mm; one without runs into the end stop."""
     positions, statuses = world.blocks("position"), world.statuses()
     world.start(MACHINE, {"machine": "rigid.yaml", "realtime": True, "watchdog": watchdog})
     process = world.start(EXCITATION, PUSH)
@@ -44,14 +44,14 @@ def test_kill_9_of_the_excitation_is_what_the_drive_makes_of_it(world: World, wa
     assert world.transition("excitation", "activate")
 
     assert world.until(lambda: place() > 0.005, 20.0)
-    assert place() < 0.1  # the travel limit has not braked yet, so what is held is the push
+    assert place() < 0.1  # the travel limit has not braked yet, so the held voltage is the drive
     process.send(signal.SIGKILL)
     heard, then = len(positions), world.node.get_clock().now().nanoseconds * 1e-9
     if watchdog > 0:
         assert world.until(lambda: any("the drive went to 0 V" in status.message for status in statuses), 3.0)
 
         def track() -> tuple[FloatArray, FloatArray]:
-            """All times and places heard; the newest may have come later than the status."""
+            """All received times and positions; the newest may be later than the status."""
             return np.concatenate([block.time for block in positions]), np.concatenate([block.values[:, 0] for block in positions])
 
         def still() -> bool:
@@ -66,11 +66,11 @@ def test_kill_9_of_the_excitation_is_what_the_drive_makes_of_it(world: World, wa
     else:
         assert world.until(lambda: place() > 0.149, 5.0)
     seq = np.concatenate([block.seq for block in positions[heard - 1 :]])
-    assert seq.size > 100 and (np.diff(seq) == 1).all()  # the encoder went on reporting
+    assert seq.size > 100 and (np.diff(seq) == 1).all()  # the encoder continued to report
 
 
 def test_a_voltage_that_starts_again_is_followed_though_its_first_blocks_were_lost(world: World) -> None:
-    """The drive has moved on by itself when a source begins again, and hears it from counter 160 on: it answers with that one's counters."""
+    """The drive has continued by itself when a source restarts at counter 160: it answers with the new counters."""
     from std_msgs.msg import Float64MultiArray
 
     from xy_sysid.nodes.common import DATA_QOS
@@ -93,7 +93,7 @@ def test_a_voltage_that_starts_again_is_followed_though_its_first_blocks_were_lo
 
 
 def test_guards_do_not_sleep_when_the_clock_is_taken_away(world: World) -> None:
-    """use_sim_time is set while it drives, and nobody publishes a clock: voltage goes on, and the watchdog still sees a silent machine."""
+    """use_sim_time is set while it drives, without a published clock: voltage continues, and the watchdog still detects a silent machine."""
     blocks, machine = world.blocks(), Integrator()
     world.machine(machine)
     process = world.start(EXCITATION, {"watchdog": 0.5, "ramp": 0.0})
@@ -109,7 +109,7 @@ def test_guards_do_not_sleep_when_the_clock_is_taken_away(world: World) -> None:
 
 
 def test_two_excitations_never_drive_one_machine(world: World) -> None:
-    """A second one that appears stops the first, with its name; the second does not configure, nor the first activate, while both are there."""
+    """A second excitation stops the first, with its name; while both exist, the second cannot configure, nor the first activate."""
     blocks, statuses = world.blocks(), world.statuses()
     world.machine(Integrator())
     first = world.start(EXCITATION, {"watchdog": 2.0, "ramp": 0.0})
@@ -128,7 +128,7 @@ def test_two_excitations_never_drive_one_machine(world: World) -> None:
     second.send(signal.SIGTERM)
     assert second.wait() == 0
     assert world.until(lambda: world.transition("excitation", "activate"), 10.0)
-    ended = len(statuses)  # nothing of the refusal stays
+    ended = len(statuses)  # the refusal has no further effect
     assert world.until(lambda: any(status.name == "excitation" and status.level == b"\x00" for status in statuses[ended:]), 10.0)
 
 
@@ -143,7 +143,7 @@ def test_an_encoder_that_freezes_is_told_and_ends_at_zero_volts(world: World) ->
         return Block(block.axes, block.seq, block.time, true.values if len(blocks) < 100 else frozen)
 
     world.machine(answer)
-    process = world.start(EXCITATION, {**PUSH, "x.offset": 2.0, "watchdog": 10.0})  # this process is the machine, and may be slow itself
+    process = world.start(EXCITATION, {**PUSH, "x.offset": 2.0, "watchdog": 10.0})  # this process is the machine, and may be slow
     activate(world)
     assert world.until(lambda: "inactive: x: the position " in process.output(), 20.0), process.output()
     assert world.until(lambda: world.state("excitation") == "inactive", 3.0) and not blocks[-1].values.any()
@@ -151,7 +151,7 @@ def test_an_encoder_that_freezes_is_told_and_ends_at_zero_volts(world: World) ->
 
 
 def test_post_stop_is_answered_from_the_machines_state(world: World, tmp_path: Path) -> None:
-    """The page's server: no 'stopped' while nobody has confirmed it, and with an excitation zero volts and its own word."""
+    """The page's server: no 'stopped' without confirmation; with an excitation, zero volts and its state."""
     from std_srvs.srv import Trigger
 
     blocks = world.blocks()
@@ -169,7 +169,7 @@ def test_post_stop_is_answered_from_the_machines_state(world: World, tmp_path: P
         world.machine(Integrator())
         process = world.start(EXCITATION, {"watchdog": 2.0, "ramp": 0.0})
         assert world.transition("excitation", "configure")
-        assert world.until(lambda: "STOP is on" in process.output(), 10.0)  # still on, from before the excitation was there
+        assert world.until(lambda: "STOP is on" in process.output(), 10.0)  # still on from before the start of the excitation
         assert not world.transition("excitation", "activate") and "from page_stop" in process.output()
         for done in (False, True):
             assert world.call(Trigger, "/xy/excitation/release_stop", Trigger.Request()).success == done

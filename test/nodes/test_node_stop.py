@@ -1,4 +1,4 @@
-"""STOP over real DDS: held per publisher, released by who set it or by an operator, quick whatever the ramps are; and one excitation alone."""
+"""STOP over real DDS: held per publisher, released by it or by an operator, fast for any ramps; and a single excitation."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def release(world: World) -> tuple[bool, str]:
 
 @pytest.mark.parametrize("latched", [True, False])
 def test_stop_is_held_by_each_who_asked_for_it(world: World, latched: bool) -> None:
-    """Two publishers: the false of one does not release the STOP of the other, latched or not, and the status names the holder."""
+    """Two publishers: false from one does not release the STOP of the other, latched or not, and the status names the holder."""
     from std_msgs.msg import Bool
 
     from xy_sysid.nodes.common import LATCHED_QOS
@@ -51,7 +51,7 @@ def test_stop_is_held_by_each_who_asked_for_it(world: World, latched: bool) -> N
     quality = LATCHED_QOS if latched else 10
     one, other = (world.node.create_publisher(Bool, "stop", quality) for _ in range(2))
     assert world.until(lambda: min(one.get_subscription_count(), other.get_subscription_count()) >= 1 + latched)
-    for _ in range(20):  # one that is not latched is lost where the listener has not discovered its publisher
+    for _ in range(20):  # a message that is not latched is lost if the subscriber has not discovered its publisher
         one.publish(Bool(data=True))
         if world.until(lambda: "STOP is on (topic stop, from test)" in process.output(), 1.0):
             break
@@ -67,7 +67,7 @@ def test_stop_is_held_by_each_who_asked_for_it(world: World, latched: bool) -> N
 
 
 def test_the_stop_of_one_who_is_gone_is_released_by_an_operator_who_was_told_whose_it_is(world: World) -> None:
-    """A process latches true and dies: false from another releases nothing; the service names it first, and overrides it when called again."""
+    """A process latches true and ends: false from another releases nothing; the service first names it, and overrides it at the second call."""
     from std_msgs.msg import Bool
 
     from xy_sysid.nodes.common import LATCHED_QOS
@@ -89,7 +89,7 @@ def test_the_stop_of_one_who_is_gone_is_released_by_an_operator_who_was_told_who
 
 
 def test_stop_is_quick_whatever_the_ramps_are(world: World) -> None:
-    """abort_ramp is set to 10 s while it drives, and a deactivate begins that fade: STOP is zero volts in half a second all the same."""
+    """abort_ramp is set to 10 s while it drives, and a deactivate starts that ramp: STOP still gives zero volts in half a second."""
     from lifecycle_msgs.msg import Transition
     from lifecycle_msgs.srv import ChangeState
     from std_msgs.msg import Bool
@@ -124,7 +124,7 @@ def alone(process: NodeProcess) -> bool:
 
 
 def test_two_excitations_of_one_name_never_drive(world: World) -> None:
-    """A launch file that was started twice: neither configures beside the other, and no voltage is published; one alone drives."""
+    """A launch file started twice: neither configures while the other exists, and no voltage is published; a single one drives."""
     from lifecycle_msgs.msg import Transition
     from lifecycle_msgs.srv import ChangeState
 
@@ -152,7 +152,7 @@ def test_two_excitations_of_one_name_never_drive(world: World) -> None:
 
 
 def test_a_second_one_of_the_same_name_for_another_topic_does_not_drive(world: World) -> None:
-    """One alone would hear each request; the first, which drives already, goes on. It is refused as soon as the second has discovered it."""
+    """The first, which drives already, continues. The second is refused as soon as it has discovered the first."""
     from lifecycle_msgs.msg import Transition
     from lifecycle_msgs.srv import ChangeState
 

@@ -1,4 +1,4 @@
-"""A robot that takes only trajectories, from a JointTrajectoryController to its response, over real DDS.
+"""A robot that accepts only trajectories, from a JointTrajectoryController to its response, over real DDS.
 
 The controller is ``xy_sim.trajectory_node``: topic, interpolation and refusals of ros2_controllers around a simulated joint.
 """
@@ -24,7 +24,7 @@ LIMITS = RUN["excitation"]["x"]
 
 
 def start(world: World, executable: str, **more: Any) -> NodeProcess:
-    """A node as the run file sets it, with a watchdog and a horizon for busy test machines.
+    """A node as in the run file, with a watchdog and a horizon for busy computers.
 
     A longer horizon makes messages that take longer than a cycle of the controller to read.
     """
@@ -40,7 +40,7 @@ def controller(world: World, **more: Any) -> NodeProcess:
 
 
 def trajectories(world: World) -> list[Any]:
-    """A list that fills with what a controller hears."""
+    """A list that fills with the messages to a controller."""
     from trajectory_msgs.msg import JointTrajectory
 
     return world.hears(JointTrajectory, TOPIC, 100)
@@ -70,7 +70,7 @@ def of(message: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def within_limits(heard: list[Any]) -> None:
-    """Every message that was sent: position, speed and acceleration, and rest at its end."""
+    """Check every sent message: position, speed and acceleration, and rest at its end."""
     for message in heard:
         times, position, speed = of(message)
         assert message.joint_names == [JOINT] and (np.diff(times) > 0).all()
@@ -81,9 +81,9 @@ def within_limits(heard: list[Any]) -> None:
 
 
 def test_a_robot_that_takes_only_trajectories_is_identified_and_stopped(world: World) -> None:
-    """With the run file that comes along: the reference as instrument gives the joint's gain, and as input the response of joint and controller.
+    """With the run file of the package: the reference as instrument gives the joint's gain, as input the response of joint and controller.
 
-    STOP brakes within the limits; then it stands.
+    STOP brakes within the limits, to rest.
     """
     from std_msgs.msg import Bool
 
@@ -106,7 +106,7 @@ def test_a_robot_that_takes_only_trajectories_is_identified_and_stopped(world: W
     assert abs(gain - 3.0) < max(3.5 / 3.92 * (high - low), 0.15), (low, gain, high)
 
     def is_the_loop() -> bool:
-        """The newest response is that of the stand-in: its delay, and one and a half of its cycles. Of few windows a line may be far off."""
+        """The newest response is that of the stand-in: its delay plus 1.5 of its cycles. With few windows a line may have a large error."""
         f, real, imaginary, _, _ = np.array(whole[-1].data).reshape(-1, 5).T if whole else np.zeros((5, 0))
         used = (f > 1.0) & (f < 4.0)
         s = 2j * np.pi * f[used]
@@ -123,15 +123,15 @@ def test_a_robot_that_takes_only_trajectories_is_identified_and_stopped(world: W
     world.spin(1.0)
     rests, ends = len(seen), of(heard[-1])[1][-1]
     world.spin(0.5)
-    assert np.ptp(seen[rests:]) < 0.05 and abs(np.mean(seen[rests:]) - ends) < 0.05, control.output()  # the load goes on
+    assert np.ptp(seen[rests:]) < 0.05 and abs(np.mean(seen[rests:]) - ends) < 0.05, control.output()  # the load continues
     within_limits(heard)
     assert "Traceback" not in drive.output() + control.output()
 
 
 def test_whoever_falls_silent_the_joint_comes_to_rest(world: World) -> None:
-    """Limits that are exceeded are refused at configure, a topic where nobody takes trajectories at activate.
+    """Exceeded limits are refused at configure, a topic without a subscriber of trajectories at activate.
 
-    Joint states that stop: the excitation brakes, goes inactive and says why. A sender that is killed: the joint ends where it was told to rest.
+    If joint states stop, the excitation brakes and becomes inactive with a reason. After a killed sender, the joint ends at its last rest point.
     """
     drive = start(world, "excitation", watchdog=1.0, **{"x.rms": 0.1})
     assert not world.transition("excitation", "configure")
@@ -163,8 +163,6 @@ def test_whoever_falls_silent_the_joint_comes_to_rest(world: World) -> None:
     drive.wait()
     moves = len(seen)
     assert world.until(lambda: len(seen) > moves + 600 and np.ptp(seen[-100:]) < 1e-3, 30.0), control.output()
-    ends = np.array(
-        [of(message)[1][-1] for message in heard[-2:]]
-    )  # a message on its way when its sender dies may reach one listener and not the other
+    ends = np.array([of(message)[1][-1] for message in heard[-2:]])  # a message of a sender that ends may reach one subscriber and not the other
     assert np.abs(ends - float(np.mean(seen[-100:]))).min() < 1e-3, (np.mean(seen[-100:]), ends)
     within_limits(heard)

@@ -1,4 +1,4 @@
-"""Drivers that give velocities and no positions, over real DDS: identified where that is asked for, and named with what to do where it is not."""
+"""Drivers with velocities and without positions, over real DDS: identified if configured, otherwise an error with the next action."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ SHAPE = {"length": 256, "band_high": 60.0, "refit": 2.0, "numerator_order": 0, "
 
 
 def test_wheels_without_positions_are_identified_by_their_velocities_and_refused_in_words_by_who_waits_for_positions(world: World) -> None:
-    """One stream, two listeners: output velocity gives gain and delay in rad; output position is an error that says what to set."""
+    """One stream, two nodes: output velocity gives gain and delay in rad; output position is an error with the required setting."""
     from sensor_msgs.msg import JointState
 
     statuses = world.statuses()
     identifier = world.start("xy_sysid.nodes.identifier", {**HEARS, **SHAPE, "output": "velocity"})
     diagnoser = world.start("xy_sysid.nodes.diagnoser", HEARS)
     source = Source(world, ("left", "right"), rate=RATE)
-    velocity = np.diff(source.y, axis=0, prepend=0.0) * RATE  # as a drive makes it of its encoder: of the sample before
+    velocity = np.diff(source.y, axis=0, prepend=0.0) * RATE  # a drive's difference of its encoder: of the previous sample
     publisher = world.node.create_publisher(JointState, "joint_states", 10_000)
     assert world.until(lambda: publisher.get_subscription_count() == 2, 40.0), identifier.output() + diagnoser.output()
     for n in range(3000):
@@ -40,7 +40,7 @@ def test_wheels_without_positions_are_identified_by_their_velocities_and_refused
             world.spin(0.005)
 
     def done() -> bool:
-        """Everything heard, one sample given up, and a fit of what came after it."""
+        """All samples received, one lost, and a fit of those after it."""
         return newest(statuses, "streams").get("stream: not_finite") == "1" and int(newest(statuses, "axis left").get("windows", "0")) >= 17
 
     assert world.until(done, 30.0), identifier.output()

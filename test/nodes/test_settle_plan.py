@@ -1,4 +1,4 @@
-"""What a series of experiments may do on a machine: the limits of its excitation."""
+"""Limits of a series of experiments on a machine: those of its excitation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ pytestmark = needs_ros
 
 @pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """What a walk in a domain of its own says."""
+    """The output of a series of experiments in a separate domain."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(new_domain()))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     return []
@@ -34,7 +34,7 @@ def test_every_limit_of_the_excitation_is_one_of_the_experiments() -> None:
 
 
 class Excitation:
-    """Answers a walk as an unconfigured excitation does, while somebody presses End here after one of its transitions."""
+    """Answers like an unconfigured excitation; End is pressed after one of its transitions."""
 
     def __init__(self, ended_after: str) -> None:
         self.asked: list[str] = []
@@ -57,7 +57,7 @@ class Excitation:
 def test_end_here_ends_it_before_anything_moves_and_says_so(
     press: str, asked: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: list[str]
 ) -> None:
-    """While the excitation configures: it is not activated any more. While it drives: it is deactivated. Either way a sentence tells the end."""
+    """During configure it is not activated; during the drive it is deactivated. In both cases a sentence reports the end."""
     from xy_sysid.nodes.settle import Settler, Wishes
 
     machine = Excitation(press)
@@ -73,7 +73,7 @@ def test_end_here_ends_it_before_anything_moves_and_says_so(
 
 
 def test_what_is_still_possible_is_told_where_somebody_ends_it(said: list[str]) -> None:
-    """And not what the last experiment had promised."""
+    """The message does not repeat the prediction of the last experiment."""
     from xy_sysid.nodes.settle import Settler, Wishes
 
     settler = Settler(Wishes("x", Path("new")), said.append, lambda: True, lambda: False)
@@ -86,7 +86,7 @@ def test_what_is_still_possible_is_told_where_somebody_ends_it(said: list[str]) 
 
 
 def test_a_joint_whose_controller_holds_its_position_is_refused() -> None:
-    """An experiment that pulls and lets go would not move it, and the budget would be spent on recordings of an axis at rest."""
+    """An experiment of pull and release would not move it, and would waste the budget on recordings at rest."""
     from xy_sysid.nodes.settle import Wishes, plan_of
 
     settings = ExcitationSettings(axes={"x": AxisExcitation(limit=0.05, rms=0.01)}, output="commands", interface="position")

@@ -1,4 +1,4 @@
-"""Which column is what: what is chosen on the page becomes what a command would have been told."""
+"""Assignment of columns: choices on the page become options of a command."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sysid.page.orders import Reading
 
 
 def test_what_is_chosen_reads_the_file_and_is_the_same_in_words(tmp_path: Path) -> None:
-    """Two axes of a table whose names tell nothing, one in mm; the command's words are those of --map, --unit and --rate."""
+    """Two axes of a table with meaningless names, one in mm; the command's options are --map, --unit and --rate."""
     rng = np.random.default_rng(1)
     table = np.column_stack([rng.normal(size=(3000, 2)), np.cumsum(rng.normal(size=(3000, 2)), axis=0)])
     np.savetxt(tmp_path / "a.csv", table, "%.9g", ",", header="p,q,r,s", comments="")
@@ -43,7 +43,7 @@ def test_units_of_time_factors_and_references_are_chosen_too(tmp_path: Path) -> 
 
 
 def test_names_that_tell_are_chosen_already(tmp_path: Path) -> None:
-    """Time in ms, a voltage and a position: nothing is left to choose; units are no part of a name."""
+    """Time in ms, a voltage and a position: no choice is needed; units are not part of a name."""
     rows = np.column_stack((np.arange(400) / 1e3, np.sin(np.arange(400.0)), np.cos(np.arange(400.0))))
     np.savetxt(tmp_path / "a.csv", rows, "%.9g", ",", header="Time,Motor Voltage (V),Encoder Pos", comments="")
     time, (axis,) = guesses(listing(tmp_path / "a.csv"))
@@ -61,6 +61,6 @@ def test_names_that_tell_are_chosen_already(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_not_chosen_is_named(time: str, rate: float | None, axes: list[AxisColumns], words: str) -> None:
-    """One line with the value, what is allowed and what to do."""
+    """One line with the value, the allowed values and the next action."""
     with pytest.raises(BadInput, match=words):
         reading_of(time, rate, axes, Reading())

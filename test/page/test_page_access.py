@@ -1,4 +1,4 @@
-"""Who may open the page: host, origin, token; judged as values, and before an application."""
+"""Access to the page: host, origin, token; as a pure function, and in front of an application."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HERE = {"host": "127.0.0.1:8080"}
 
 @pytest.mark.parametrize("host", ["localhost:8080", "127.0.0.1:8080", "[::1]:8080", "LOCALHOST"])
 def test_this_machine_may_come_in_by_its_names(host: str) -> None:
-    """On loopback nothing more is asked."""
+    """On loopback no token is needed."""
     assert judge(rules("127.0.0.1"), {"host": host}, "").status == 200
 
 
@@ -32,7 +32,7 @@ def test_a_name_that_was_made_to_point_here_is_refused(host: str) -> None:
     "origin", ["http://evil.example", "https://127.0.0.1.evil.example", "http://127.0.0.1:9999", "null", "http://localhost:8080", "file://", "x"]
 )
 def test_a_foreign_origin_is_refused(origin: str) -> None:
-    """Other pages, other ports and sandboxes may not give orders, whatever else they know."""
+    """Other pages, other ports and sandboxes may not give orders, even with the token."""
     for access in (rules("127.0.0.1"), rules("0.0.0.0", "secret")):
         answer = judge(access, {**HERE, "origin": origin, "cookie": f"{COOKIE}=secret"}, "")
         assert answer.status == 403 and "refused" in answer.words
@@ -62,7 +62,7 @@ def test_only_loopback_goes_without_a_token(host: str, here: bool) -> None:
 
 
 def test_a_token_in_the_address_becomes_a_cookie_and_leaves_the_address() -> None:
-    """Right token: a cookie, and on to the address without it. Wrong or none: 401 in words."""
+    """Right token: a cookie, and a redirect to the address without it. Wrong or none: 401 with a sentence."""
     access = Access("secret", ())
     entered = judge(access, {"host": "machine:8080"}, "token=secret&x=1")
     assert (entered.status, entered.cookie, entered.to) == (303, "secret", "/?x=1")
@@ -75,14 +75,14 @@ def test_a_token_in_the_address_becomes_a_cookie_and_leaves_the_address() -> Non
 
 @pytest.mark.parametrize("length", ["1048577", "99999999999999999999", "-1", "1e3", "", "abc", "10, 20", "\u0663"])
 def test_a_body_that_is_too_large_or_has_no_honest_length_is_refused(length: str) -> None:
-    """Before a byte of it is read: 413, in words; what fits is let through."""
+    """Before a byte is read: 413 with a sentence; a smaller body is accepted."""
     answer = judge(rules("127.0.0.1"), {**HERE, "content-length": length}, "")
     assert answer.status == 413 and str(LARGEST) in answer.words
     assert judge(rules("127.0.0.1"), {**HERE, "content-length": str(LARGEST)}, "").status == 200
 
 
 def test_a_body_without_a_length_ends_where_it_becomes_too_large() -> None:
-    """Chunk after chunk without end: the application hears that the other side has gone, and no more of it."""
+    """Endless chunks: the application gets a disconnect, and no more data."""
     taken: list[int] = []
 
     async def application(scope: Any, receive: Any, send: Any) -> None:
@@ -102,7 +102,7 @@ def test_a_body_without_a_length_ends_where_it_becomes_too_large() -> None:
 
 @pytest.mark.parametrize("kind", ["http", "websocket"])
 def test_who_has_gone_before_anybody_listened_ends_in_silence_but_a_stop_is_obeyed(kind: str) -> None:
-    """The library behind a page's WebSocket raises KeyError of such a line; POST /stop goes through whoever waits for its answer."""
+    """The library of the page's WebSocket raises KeyError for such a connection; POST /stop is handled even if its sender has left."""
     reached: list[str] = []
 
     async def application(scope: Any, receive: Any, send: Any) -> None:
@@ -126,7 +126,7 @@ def test_who_has_gone_before_anybody_listened_ends_in_silence_but_a_stop_is_obey
 
 @pytest.mark.parametrize(("kind", "told"), [("http", ("http.response.start", 400)), ("websocket", ("websocket.close", 1003))])
 def test_a_page_whose_session_has_ended_is_told_so_and_other_errors_are_not_hidden(kind: str, told: tuple[str, int]) -> None:
-    """The library raises KeyError of a session that was closed a moment ago; of our own address nothing is swallowed."""
+    """The library raises KeyError for a session that was just closed; for our own addresses no error is hidden."""
     sent: list[Any] = []
 
     async def application(scope: Any, receive: Any, send: Any) -> None:
@@ -149,7 +149,7 @@ def test_a_page_whose_session_has_ended_is_told_so_and_other_errors_are_not_hidd
 
 
 def test_odd_headers_do_not_break_it() -> None:
-    """Broken names and cookies are no names and no cookies."""
+    """Invalid names and cookies are ignored."""
     assert name_of("[[[") == "" and cookie_of("=;=\xff;") == "" and name_of("Host:notaport") == "host"
 
 
@@ -162,7 +162,7 @@ async def _application(scope: Any, receive: Any, send: Any) -> None:
 
 
 def ask(access: Access, path: str = "/", kind: str = "http", query: str = "", **headers: str) -> tuple[dict[str, Any], dict[str, str], str]:
-    """The first message, headers and body with which a guarded application answers."""
+    """First message, headers and body of a guarded application's answer."""
     given = {"host": "127.0.0.1:8080", **{name.replace("_", "-"): value for name, value in headers.items()}}
     scope = {
         "type": kind,
@@ -184,7 +184,7 @@ def ask(access: Access, path: str = "/", kind: str = "http", query: str = "", **
 
 
 def test_the_guard_stands_before_http_and_websockets() -> None:
-    """What is refused never reaches the application; what is let in may not be framed by others."""
+    """A refused request never reaches the application; an accepted page cannot be framed by others."""
     access = rules("127.0.0.1")
     first, headers, body = ask(access)
     assert first["status"] == 200 and body == "inside" and headers["x-frame-options"] == "DENY"
@@ -198,7 +198,7 @@ def test_the_guard_stands_before_http_and_websockets() -> None:
 
 
 def test_stop_is_obeyed_without_the_page_and_without_an_origin() -> None:
-    """As ``curl -X POST`` sends it, even with the signs of another site's form: it can only stop. With an origin it must be the page's own."""
+    """As by ``curl -X POST``, even with the headers of another site's form: it can only stop. An origin must be the page's own."""
     access = rules("127.0.0.1")
     assert ask(access, "/stop")[2] == "inside"
     assert ask(access, "/stop", **{"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"})[2] == "inside"
@@ -207,7 +207,7 @@ def test_stop_is_obeyed_without_the_page_and_without_an_origin() -> None:
 
 
 def test_scripts_come_from_this_server_only() -> None:
-    """No address made of text or of a blob is a script, nothing is embedded, and no other base for addresses can be set."""
+    """No scripts from data or blob addresses, no embedded objects, and no other base address."""
     policy = dict(part.split(" ", 1) for part in ask(rules("127.0.0.1"))[1]["content-security-policy"].split("; "))
     assert not {"data:", "blob:", "*", "https:"} & set(policy["script-src"].split())
     assert policy["default-src"] == "'self'" and policy["object-src"] == policy["base-uri"] == policy["frame-ancestors"] == "'none'"

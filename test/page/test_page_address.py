@@ -1,4 +1,4 @@
-"""The view of the page in its address: what is written is read again, and what nobody wrote is ignored."""
+"""The view of the page in its address: it is restored from there, and invalid parts are ignored."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def test_a_view_that_is_written_into_an_address_is_read_again(view: PageView) ->
 
 @given(st.text(max_size=300))
 def test_any_query_is_read_and_a_read_one_is_written_the_same(query: str) -> None:
-    """Whatever stands in an address is read without an error."""
+    """Any address is read without an error."""
     view = view_of_query(query)
     assert view_of_query(query_of(view)) == view
 
 
 def test_an_address_reads_as_people_would_write_it() -> None:
-    """No marks of code in it; the machine is named live."""
+    """No percent codes in it; the machine is named live."""
     dry = SourceView("days/dry.npz", axis="y", model="rigid", effects={"x": ("coulomb_friction", "cogging")})
     view = PageView((SourceView("", model="linear"), dry), "dark")
     written = "live=1&model=linear&rec=days/dry.npz&axis=y&model=rigid&effects=x:coulomb_friction,cogging&theme=dark"
@@ -49,19 +49,19 @@ def test_an_address_reads_as_people_would_write_it() -> None:
 
 
 def test_units_that_are_usual_or_unknown_are_not_kept() -> None:
-    """One of lengths and one of angles, whatever their order; the usual ones need no word."""
+    """One of lengths and one of angles, in any order; the defaults are not in the address."""
     assert view_of_query("units=deg,parsec,mm,um").units == ("um", "deg")
     assert query_of(PageView(units=("um", "deg"))) == "units=um,deg" and view_of_query("units=mm,mrad") == PageView()
 
 
 def test_a_long_address_is_cut() -> None:
-    """More sources than can be open, and more characters than a browser sends, cost nothing."""
+    """More sources than can be open, and more characters than a browser sends, are ignored."""
     assert len(view_of_query("&".join(f"rec={k}" for k in range(100))).sources) == 7
     assert view_of_query("&" * 100_000) == PageView() and view_of_query("&".join(f"a{k}=1" for k in range(900))) == PageView()
 
 
 def test_the_token_goes_and_the_view_stays() -> None:
-    """What the guard redirects to."""
+    """The redirect target of the guard."""
     assert without("token=secret&rec=dry.npz&axis=y&token=again", "token") == "rec=dry.npz&axis=y"
 
 

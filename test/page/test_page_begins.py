@@ -1,4 +1,4 @@
-"""The first half minute of the demo in a real browser, frame by frame: nothing lies on anything else, and no card moves."""
+"""The first half minute of the demo in a real browser, frame by frame: no overlaps, and no card moves."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ pytestmark = [needs_browser, needs_ros]
 
 EVERY = 125  # ms between two frames, of one tab and then of the other
 STILL = 6.0  # px that a card may move
-SLOW = 0.15  # times real time, so that the page is there long before the verdict on a busy machine, too
+SLOW = 0.15  # times real time, so that the page is open long before the verdict, also on a busy computer
 SOON = 5.5  # s from 10 s of data to the verdict on the rigid model, on a quiet machine: 8 s from the first sample of the demo, which runs 4 times
 # faster than real time
 
 
 @dataclass
 class Frames:
-    """What was seen: words on each other, cards that moved, headline and sentence of each frame, and s since the first."""
+    """Observations: overlapping words, moved cards, headline and sentence of each frame, and s since the first."""
 
     tab: Tab
     over: list[str] = field(default_factory=list)
@@ -52,13 +52,13 @@ class Frames:
         self.tab.page.wait_for_timeout(EVERY)
 
     def since(self, words: str) -> float:
-        """s of the first frame whose headline or sentence says so."""
+        """s of the first frame whose headline or sentence contains this text."""
         return next(at for at, headline, sentence in self.said if words in headline or words in sentence)
 
 
 @pytest.fixture
 def chromium() -> Iterator[Any]:
-    """It is there before the demo begins, as a user's browser is."""
+    """It runs before the demo begins, like a user's browser."""
     with browser() as made:
         yield made
 
@@ -85,9 +85,9 @@ def address(tmp_path: Path, chromium: Any) -> Iterator[str]:
 
 
 def test_the_demo_begins_without_a_jump_and_says_what_is_awaited(address: str, chromium: Any) -> None:
-    """Every quarter of a second until the rigid model is drawn and the coupling is told, and a while on: no two words lie on each other, each
-    card stays where it was first seen, on a wide screen and on a narrow one. It is said what is awaited, never to press what is disabled, and
-    the verdict comes soon after the data that it needs."""
+    """Every 0.25 s until the rigid model is drawn and the coupling is known, and a while after: no two words overlap, each
+    card keeps its first place, on a wide and on a narrow screen. The text names what is awaited, never a disabled button, and
+    the verdict comes soon after its data."""
     tabs = [Tab(chromium, address, width) for width in (1400, 400)]
     tabs[0].until(lambda: all(tab.page.locator(".panel").count() == 1 and tab.places() for tab in tabs), 30)
     seen = [Frames(tab) for tab in tabs]
@@ -114,7 +114,7 @@ def test_the_demo_begins_without_a_jump_and_says_what_is_awaited(address: str, c
 
 
 def newer_data_can_be_used(tab: Tab) -> None:
-    """It says which seconds were used, and that newer ones have come; pressed, these are used."""
+    """It shows the used seconds, and that there are newer ones; the button uses these."""
     used = tab.page.locator("[data-part=used]")
     tab.until(lambda: "newer data have come" in str(used.text_content()), 30)
     assert "Fitted to seconds " in str(used.text_content())

@@ -1,4 +1,4 @@
-"""Whatever fails in a worker becomes a sentence with what to do: never the name of a Python error on the page."""
+"""Any error in a worker becomes a sentence with the next action: never the name of a Python error on the page."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TRACE = 'Traceback (most recent call last):\n  File "x.py", line 3, in f\nValueE
 
 
 class Heard:
-    """What a session tells everybody."""
+    """The messages of a session."""
 
     def __init__(self) -> None:
         self.words: list[str] = []
@@ -43,7 +43,7 @@ class Heard:
     ids=lambda item: type(item).__name__,
 )
 def test_work_that_fails_is_told_in_a_sentence(error: Exception, words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of the trend, the columns, the report and the use of a model; the place of the error is in the log."""
+    """Errors of trend, columns, report and use of a model; the place of the error is in the log."""
     session: Any = Heard()
 
     async def fails() -> int:
@@ -55,7 +55,7 @@ def test_work_that_fails_is_told_in_a_sentence(error: Exception, words: str, cap
 
 
 def test_work_that_succeeds_is_given_on() -> None:
-    """And nobody is told anything."""
+    """Without a message."""
     session: Any = Heard()
 
     async def works() -> int:
@@ -79,7 +79,7 @@ def test_a_command_that_fails_is_told_by_its_own_line_or_a_sentence(code: int, s
 def test_a_recording_that_cannot_be_opened_for_an_error_of_ours_is_closed_with_a_sentence(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The worker does not just end."""
+    """The worker does not end silently."""
     sent: list[WorkerNews] = []
 
     def broken(*_: object) -> None:
@@ -99,7 +99,7 @@ def test_a_recording_that_cannot_be_opened_for_an_error_of_ours_is_closed_with_a
 
 @needs_ros
 def test_a_walk_that_fails_is_told_in_a_sentence() -> None:
-    """Design the next experiment, Run it: an error of ours ends it with what to do, and its name is in the log."""
+    """Design the next experiment, Run it: an internal error ends it with the next action, and its name is in the log."""
     from xy_sysid.nodes.settle import Settler
     from xy_sysid.nodes.wall import Wall
 
@@ -125,7 +125,7 @@ def test_a_walk_that_fails_is_told_in_a_sentence() -> None:
 
 
 def test_every_worker_of_the_page_is_behind_such_a_sentence() -> None:
-    """Who lets something be worked out in another thread or process of the page does it through ``beside``, or draws a picture."""
+    """All work in other threads or processes of the page uses ``beside``, except the drawing of figures."""
     folder = Path(sys.modules["xy_sysid.page.beside"].__file__ or "").parent
     bold = {
         f"{path.name}: {line.strip()}"

@@ -1,4 +1,4 @@
-"""The page on recordings in a real browser: pictures, diagnosis, effects by clicks, reload, two tabs, who may come in."""
+"""The page on recordings in a real browser: figures, diagnosis, effects by clicks, reload, two tabs, access."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ pytestmark = needs_browser
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two recordings: dry friction that the rigid model does not know, and a table with nothing to find."""
+    """Two recordings: dry friction that the rigid model lacks, and a table without missing effects."""
     made = tmp_path_factory.mktemp("recordings")
     said = cli("simulate", made / "dry.npz", "--machine", "rigid.yaml", "--effect", "coulomb_friction", "--duration", "12")
     assert said.code == 0, said.err
@@ -51,7 +51,7 @@ def chromium() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def usual(chromium: Any, server: Server) -> Iterator[Tab]:
-    """A tab that most tests share, as loading takes longer than most of them."""
+    """A tab shared by most tests, because loading takes longer than most of them."""
     made = Tab(chromium, server.address)
     yield made
     made.close()
@@ -59,7 +59,7 @@ def usual(chromium: Any, server: Server) -> Iterator[Tab]:
 
 @pytest.fixture
 def tab(chromium: Any, server: Server) -> Iterator[Callable[..., Tab]]:
-    """Open a tab of one's own."""
+    """Open a separate tab."""
     made: list[Tab] = []
 
     def open_tab(width: int = 1400, mode: str = "light", address: str = "") -> Tab:
@@ -72,7 +72,7 @@ def tab(chromium: Any, server: Server) -> Iterator[Callable[..., Tab]]:
 
 
 def turn(one: Tab, axis: str) -> None:
-    """Show another axis, and wait until it is what is shown."""
+    """Select another axis, and wait until it is shown."""
     one.page.get_by_role("button", name=f"axis {axis}").click()
     one.until(lambda: one.page.locator(f".plot[aria-label^='The error ladder of axis {axis}']").count() == 1)
 
@@ -91,7 +91,7 @@ def ready(one: Tab) -> Tab:
 
 
 def test_everything_is_drawn_and_nothing_is_fetched_from_elsewhere(usual: Tab, server: Server) -> None:
-    """Each picture has curves and a description; no request leaves this server, and no error is in the console."""
+    """Each figure has curves and a description; no request goes to another server, and no error is in the console."""
     one = ready(usual)
     one.until(lambda: one.curves("Measured and modelled over frequency, bode", "model")[0])
     for name in ("bode", "coherence", "residual speed", "zoom", "poles zeros"):
@@ -103,7 +103,7 @@ def test_everything_is_drawn_and_nothing_is_fetched_from_elsewhere(usual: Tab, s
 
 @pytest.mark.parametrize(("width", "mode"), [(400, "dark"), (1400, "light")])
 def test_it_fits_a_phone_and_follows_light_and_dark(tab: Callable[..., Tab], width: int, mode: str) -> None:
-    """No sideways scrolling; paper and ink follow the system; every button and picture has a name for screen readers."""
+    """No horizontal scrolling; colours follow the system; every button and figure has a name for screen readers."""
     one = ready(tab(width, mode))
     assert one.wide() <= width
     shade = one.page.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -117,7 +117,7 @@ def test_it_fits_a_phone_and_follows_light_and_dark(tab: Callable[..., Tab], wid
 
 
 def test_the_first_picture_shows_the_failure_and_one_button_is_next(usual: Tab) -> None:
-    """Above the fold at 1400 x 900: where the model fails, the ladder beside it, what is missing, and Diagnose filled, alone."""
+    """Visible at 1400 x 900: where the model fails, the error ladder, the missing effect, and Diagnose as the only filled button."""
     one = ready(usual)
     one.page.set_viewport_size({"width": 1400, "height": 900})
     one.until(lambda: "fails" in one.failing("frequency"))
@@ -128,13 +128,13 @@ def test_the_first_picture_shows_the_failure_and_one_button_is_next(usual: Tab) 
 
 
 def explained(one: Tab, steps: int) -> bool:
-    """Headline, ladder, first picture and tiles say so at the same time."""
+    """Headline, ladder, first figure and tiles show it at the same time."""
     told = one.headline().startswith("Explained: ") and one.fact("worst place").startswith("nowhere")
     return told and len(one.ladder()) == steps and one.over_floor() < 2
 
 
 def failing(one: Tab, steps: int) -> bool:
-    """The same of a model that fails."""
+    """The same for a model that fails."""
     told = one.headline().startswith("Something is missing: ") and one.fact("worst place").endswith("by frequency")
     return told and len(one.ladder()) == steps and one.over_floor() > 20
 
@@ -143,9 +143,9 @@ FAILS = "Error over the noise floor by frequency"
 
 
 def test_the_whole_page_follows_the_story_from_failing_to_explained(usual: Tab, tab: Callable[..., Tab]) -> None:
-    """Diagnose names it, Add explains it: headline, response, tiles, residual and ladder change together, in a second tab too.
+    """Diagnose names it, Add explains it: headline, response, tiles, residual and ladder change together, also in a second tab.
 
-    Remove, Auto and Start over leave nothing stale, and the rigid model is one click away.
+    Remove, Auto and Start over update everything, and the rigid model is one click away.
     """
     one, other = ready(usual), ready(tab())
     worst = one.over_floor()
@@ -184,12 +184,12 @@ def test_the_whole_page_follows_the_story_from_failing_to_explained(usual: Tab, 
 
 
 def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(usual: Tab) -> None:
-    """The work goes on without the browser; Cancel leaves the story as it was."""
+    """The work continues without the browser; Cancel keeps the previous story."""
     one = ready(usual)
     busy, free = one.page.locator("[data-act=cancel]"), one.page.locator("[data-act=diagnose]")
     turn(one, "y")
     one.until(free.is_enabled)
-    for _ in range(6):  # a short fit may be over before the click
+    for _ in range(6):  # a short fit may end before the click
         one.page.evaluate(LEAVE_AT_ONCE)
         one.until(free.is_enabled, 60)
         one.page.wait_for_timeout(1000)  # the notice comes with the next push
@@ -204,13 +204,13 @@ def test_a_reload_in_the_middle_loses_nothing_and_a_fit_can_be_left(usual: Tab) 
 
 
 def test_wrong_use_is_answered_in_a_sentence(usual: Tab) -> None:
-    """Nothing chosen to add: the page says what is allowed."""
+    """No effect chosen to add: the page gives the allowed ones."""
     one = ready(usual)
     one.press_until("add", lambda: "effect: name is ''" in one.notices() and "coulomb_friction" in one.notices(), 10)
 
 
 def test_recordings_stand_side_by_side_and_a_lost_one_says_so(usual: Tab, server: Server) -> None:
-    """Opened from the list of the folder; when its process dies, the page says that it is closed, and the other goes on."""
+    """Opened from the list of the folder; if its process ends, the page says that it is closed, and the other continues."""
     one = ready(usual)
     before = set(server.children())
     chosen = one.page.get_by_role("combobox", name="recording")
@@ -231,7 +231,7 @@ def test_recordings_stand_side_by_side_and_a_lost_one_says_so(usual: Tab, server
 
 
 def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Callable[..., Tab], server: Server) -> None:
-    """Recording, axis, model, picture, theme and added effects stand in the address; a recording that is not there is said."""
+    """Recording, axis, model, figure, theme and added effects are in the address; a missing recording is reported."""
     one = ready(usual)
     wanted = "rec=dry.npz&axis=y&model=rigid&pictures=residual_position&effects=y:coulomb_friction&rec=plain.npz&theme=dark&units=um"
     link = f"{server.address}?{wanted}&rec=nowhere.npz"
@@ -257,7 +257,7 @@ def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Calla
     def closed_in_both() -> bool:
         return other.page.locator(".panel").count() == 1 and "plain.npz" not in one.page.url and "effects=y:coulomb_friction" in one.page.url
 
-    # closed again after 20 s: a tab that lost its connection and is loaded again opens what its old address names
+    # closed again after 20 s: a tab that is reloaded after a lost connection opens the recordings of its old address
     other.click_until(close, closed_in_both, 40, "the recording is not closed, or the other tab keeps an old address")
     reset = first.locator("[data-act=reset]")
     other.click_until(reset, lambda: "effects" not in other.page.url, 30, "an effect that was taken out is still in the address")
@@ -265,7 +265,7 @@ def test_a_link_opens_the_same_view_and_a_reload_keeps_it(usual: Tab, tab: Calla
 
 
 def test_columns_without_names_that_tell_are_chosen_by_clicks_and_two_recordings_stand_in_one_picture(usual: Tab) -> None:
-    """A table with columns A, B, C, in mm: listed with its numbers, opened as chosen; then both recordings in one picture."""
+    """A table with columns A, B, C, in mm: listed with its numbers, opened as chosen; then both recordings in one figure."""
     one = ready(usual)
     chosen = one.page.get_by_role("combobox", name="recording")
     one.click_until(one.page.get_by_role("button", name="Open a recording"), chosen.is_visible)
@@ -281,7 +281,7 @@ def test_columns_without_names_that_tell_are_chosen_by_clicks_and_two_recordings
         option = one.page.locator(".q-menu").last.get_by_role("option", name=column, exact=True)
         option.click()
         option.wait_for(state="hidden")
-    with one.unheard():  # what the page shows is what counts
+    with one.unheard():  # the text on the page counts
         dialog.locator("input[data-pick=output-unit]").fill("mm")
     dialog.get_by_role("button", name="Open", exact=True).click()
     second = one.page.locator(".panel").nth(1)
@@ -326,7 +326,7 @@ def test_a_page_from_elsewhere_cannot_give_orders(tab: Callable[..., Tab], serve
 
 
 def test_from_another_machine_a_token_is_needed(chromium: Any, folder: Path) -> None:
-    """Listening on all addresses: the printed address lets in, and only it; the token does not stay in the address."""
+    """Listening on all addresses: only the printed address gives access; the token is removed from the address."""
     made = Server(folder, folder / "plain.npz", "--host", "0.0.0.0", XY_SYSID_TOKEN="a-token-of-this-test")
     try:
         port = made.address.partition("?")[0].rstrip("/").rpartition(":")[2]

@@ -1,4 +1,4 @@
-"""xy-sysid page from the command line: what is wrong is said in one line before anything starts."""
+"""xy-sysid page from the command line: errors in one line before anything starts."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from xy_sysid.page.server import listen, url
     ],
 )
 def test_a_wrong_use_is_one_line(arguments: tuple[str, ...], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Exit code 2, the value, and what is allowed."""
+    """Exit code 2, the value, and the allowed range."""
     monkeypatch.chdir(tmp_path)
     recording = npz(tmp_path / "a.npz", rows=600)
     assert words in refused("page", *(recording if word == "REC" else word for word in arguments))
 
 
 def test_how_recordings_are_read_reaches_worker_and_report() -> None:
-    """--topic and --effort become arguments of load and, word by word, of the report."""
+    """--topic and --effort become arguments of load and, unchanged, of the report."""
     how = reading(["voltage=/drive/u"], True, None)
     assert how.load == {"voltage_topic": "/drive/u", "effort_as_voltage": True}
     assert how.words == ("--topic", "voltage=/drive/u", "--effort")
@@ -56,7 +56,7 @@ def test_how_tables_are_read_reaches_worker_and_report() -> None:
 
 
 def test_a_port_that_is_taken_gives_the_next() -> None:
-    """Two pages on one machine; the address that is printed is the one that answers, with the token where there is one."""
+    """Two pages on one computer; the printed address is the one that answers, with the token if there is one."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with listen("127.0.0.1", port) as found:
@@ -78,6 +78,6 @@ def test_the_address_comes_as_json_and_ctrl_c_ends_the_page(tmp_path: Path) -> N
 
 
 def test_what_is_done_is_told_in_words() -> None:
-    """The name of the effect as people write it; the diagnoser's own words where it has some."""
+    """The name of the effect with spaces; the diagnoser's own words if available."""
     assert OrderState(Order(1, "add", "x", "dead_zone"), 0.0).words == "adding dead zone"
     assert OrderState(Order(1, "auto", "x"), 0.0, said="axis x: fitting").words == "axis x: fitting"

@@ -1,4 +1,4 @@
-"""The demo with its page, as a user starts it: an address within seconds, and Ctrl-C ends everything."""
+"""The demo with its page, started like a user: an address within seconds, and Ctrl-C ends everything."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = needs_ros
 
 
 def test_the_demo_prints_the_address_of_a_page_that_answers_and_ctrl_c_ends_all_of_it(tmp_path: Path) -> None:
-    """The page is there, at the port that was asked for, while the nodes run; afterwards no process is left, and the folder is empty."""
+    """The page answers at the requested port while the nodes run; afterwards no process is left, and the folder is empty."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     mark = uuid.uuid4().hex
@@ -56,7 +56,7 @@ def test_the_demo_prints_the_address_of_a_page_that_answers_and_ctrl_c_ends_all_
 
 
 def test_the_page_comes_only_where_somebody_sits() -> None:
-    """Piped, in a script or with --json the demo is what it was; --page and --no-page decide otherwise."""
+    """Piped, in a script or with --json the demo has no page by default; --page and --no-page override this."""
     assert wished(None, False) is False  # no terminal here
     assert wished(True, False) is True and wished(False, False) is False
     assert wished(None, True) is False

@@ -1,4 +1,4 @@
-"""The page's state of a joint whose name no topic can have: every topic finds its axis, whatever comes first."""
+"""The page's state of a joint whose name is not valid in a topic: every topic finds its axis, in any order of arrival."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def table(kind: str) -> ArrayMessage:
 
 
 def test_topics_statuses_and_stories_of_joint_2_are_one_axis() -> None:
-    """Arrays on frf/joint_2 alone are called so as long as nobody says better; with a status or a story they are those of joint-2."""
+    """Arrays on frf/joint_2 alone keep this name; with a status or a story they belong to joint-2."""
     heard = TopicsState()
     heard.array(table("frf"))
     assert heard.axes() == ("joint_2",)

@@ -1,4 +1,4 @@
-"""The live page in a real browser, with real nodes over DDS: curves converge, an effect is found, STOP stops, the lost are named."""
+"""The live page in a real browser, with real nodes over DDS: curves converge, an effect is found, STOP stops, lost nodes are named."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Scene:
         self.tab = Tab(made, self.server.address)
 
     def lifecycle(self, words: str, seconds: float = 15.0) -> None:
-        """Wait until the page says so of the excitation."""
+        """Wait until the page shows this state of the excitation."""
         said = self.tab.page.locator("[data-part=lifecycle]")
         self.tab.until(lambda: words in str(said.text_content()), seconds, lambda: f"{words!r} is not said, but {said.text_content()!r}")
 
@@ -55,11 +55,11 @@ class Scene:
         self.lifecycle("driving")
 
     def nodes(self) -> str:
-        """What the page says of the nodes."""
+        """The text about the nodes."""
         return str(self.tab.page.locator("[data-part=nodes]").text_content())
 
     def silent(self) -> bool:
-        """No more voltage comes, and the last was zero."""
+        """No more voltage is received, and the last was zero."""
         self.world.spin(0.3)
         count = len(self.blocks)
         self.world.spin(0.4)
@@ -77,7 +77,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
 
 
 def test_curves_converge_live(scene: Scene) -> None:
-    """Nothing moves before Activate; then the response comes, and its band narrows as windows come in."""
+    """No motion before Activate; then the response appears, and its band narrows with more windows."""
     tab = scene.tab
     scene.lifecycle("not configured", 30)
     assert scene.blocks == []
@@ -88,8 +88,8 @@ def test_curves_converge_live(scene: Scene) -> None:
     pressed = [0.0]
 
     def linear_is_shown() -> bool:
-        """A press that was lost with a connection is made again, as a person does."""
-        if not linear.is_visible():  # before there is a story, nothing else is shown
+        """A press that was lost with a connection is repeated, as a person would."""
+        if not linear.is_visible():  # before a story, only this is shown
             return False
         if tab.page.locator("[aria-label='linear fit, live']:visible").count() == 1:
             return len(pressed) > 1
@@ -117,14 +117,14 @@ def test_curves_converge_live(scene: Scene) -> None:
 
 
 def at_noise(worst: str) -> bool:
-    """The tile of the explained model: no place, or one that chance made on a few windows; the rigid model's is above 4."""
+    """The tile of the explained model: no place, or one by chance on a few windows; the rigid model's is above 4."""
     return worst.startswith("nowhere") or (bool(worst) and float(worst.split()[0]) < 3.0)
 
 
 def test_the_failing_picture_comes_by_itself_and_every_number_follows_the_story(scene: Scene) -> None:
-    """Unasked, the rigid model's failure is drawn; Diagnose, Add: headline, picture, ladder and tiles are the explained model's.
+    """The failure of the rigid model is drawn automatically; after Diagnose and Add, headline, figure, ladder and tiles are the explained model's.
 
-    The linear fit is one click away, its intervals marked as unsure; Remove and Start over leave nothing stale.
+    The linear fit is one click away, with its intervals marked as unsure; Remove and Start over update everything.
     """
     tab = scene.tab
     scene.drive()
@@ -167,10 +167,10 @@ def test_settings_are_checked_and_reach_the_node(scene: Scene) -> None:
         return words in str(told.text_content())
 
     def asked(typed: str, pressed: list[float]) -> None:
-        """Type and press; again where a page that was loaded again, as after a stall of the machine, has forgotten it, or a press is lost."""
+        """Type and press; repeat if a reload after a stall has cleared it, or a press is lost."""
         from playwright.sync_api import TimeoutError as Late
 
-        with contextlib.suppress(Late):  # it is being loaded again just now
+        with contextlib.suppress(Late):  # it is being reloaded
             if not field.is_visible():
                 tab.page.locator("[data-part=excitation]").click(timeout=5000)
                 field.wait_for(state="visible", timeout=5000)
@@ -217,7 +217,7 @@ def test_a_bag_is_recorded_and_opened_beside(scene: Scene) -> None:
 
 
 def recorded(bag: Path, topic: str) -> int:
-    """Messages of a topic that a bag holds already, while it is written."""
+    """Messages of a topic in a bag that is still being written."""
     for file in bag.glob("*.db3"):
         with closing(sqlite3.connect(f"file:{file}?mode=ro", uri=True)) as data:
             try:
@@ -230,7 +230,7 @@ def recorded(bag: Path, topic: str) -> int:
 
 @pytest.mark.parametrize("way", ["button", "Escape"])
 def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> None:
-    """By the button and by the key: the node itself says inactive, the last voltage is zero, and the page says so."""
+    """By the button and by the key: the node is inactive, the last voltage is zero, and the page says so."""
     tab, world = scene.tab, scene.world
     scene.drive()
     world.spin(0.3)
@@ -243,7 +243,7 @@ def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> No
     heard: list[str] = []
 
     def stopped() -> bool:
-        """The page says both; a message stays for some seconds only, and may be gone before the other comes."""
+        """The page shows both; a message is shown for some seconds only, and may end before the other appears."""
         heard.append(tab.notices())
         lifecycle = str(tab.page.locator("[data-part=lifecycle]").text_content())
         return "nothing moves before Activate" in lifecycle and any("stopped: the excitation is" in words for words in heard)
@@ -253,12 +253,12 @@ def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> No
     tab.until(lambda: tab.page.get_by_role("button", name="Release STOP and activate").is_enabled(), 15, "what Activate does with STOP is not said")
     assert "activate is refused" not in scene.nodes()
     cancel = tab.page.get_by_role("button", name="Cancel").last
-    if way == "button" and cancel.is_visible():  # a page that was loaded again has no dialog
+    if way == "button" and cancel.is_visible():  # a reloaded page has no dialog
         cancel.click()
 
 
 def test_the_stop_of_another_is_overridden_with_its_name_seen(scene: Scene) -> None:
-    """The button and the state say that somebody else holds STOP; a dialog names the holder, and after the override Activate is only Activate."""
+    """The button and the state say that another node holds STOP; a dialog names it, and after the override the button is only Activate."""
     from std_msgs.msg import Bool
 
     tab = scene.tab
@@ -267,7 +267,7 @@ def test_the_stop_of_another_is_overridden_with_its_name_seen(scene: Scene) -> N
     said = tab.page.locator("[data-part=lifecycle]")
 
     def held() -> bool:
-        stop.publish(Bool(data=True))  # again, as one subscriber may be found before the other
+        stop.publish(Bool(data=True))  # repeated, because one subscriber may be found before the other
         return "STOP is on from test. Release it there, or override it here" in str(said.text_content())
 
     tab.until(held, 20, "the page does not say who holds STOP")
@@ -277,7 +277,7 @@ def test_the_stop_of_another_is_overridden_with_its_name_seen(scene: Scene) -> N
     override = tab.page.locator("[data-act=override]")
     tab.click_until(activate, override.is_visible, why="the dialog does not open")
     assert "STOP is on from: test" in str(tab.page.locator(".card", has=override).text_content())
-    for _ in range(2):  # opened and cancelled, and again: nothing is overridden by that
+    for _ in range(2):  # opened and cancelled, twice: nothing is overridden
         tab.page.get_by_role("button", name="Cancel").last.click()
         tab.until(lambda: override.count() == 0, 15, "the dialog stays")
         tab.click_until(activate, override.is_visible, why="the dialog does not open")

@@ -1,4 +1,4 @@
-"""Orders of the page that get lost on the way, as on a computer under load: asked again, never twice what must be done once."""
+"""Lost orders of the page, as on a loaded computer: repeated, but never one that must run only once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xy_sysid.page.topics_state import TopicsState
 
 
 class Deaf:
-    """A link whose orders get lost."""
+    """A link that loses its orders."""
 
     def __init__(self) -> None:
         self.asked: list[str] = []
@@ -30,7 +30,7 @@ class Deaf:
 
 
 def test_a_diagnosis_that_nobody_heard_of_is_asked_for_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Idle for ten seconds after an order: asked once more, twice at most; never once the diagnoser has worked, whose answer was lost then."""
+    """Idle for ten seconds after an order: repeated, at most twice; never if the diagnoser has worked and only its answer was lost."""
     now = [1000.0]
     monkeypatch.setattr("xy_sysid.page.live.time.monotonic", lambda: now[0])
     heard, deaf = TopicsState(), Deaf()
@@ -55,7 +55,7 @@ def test_a_diagnosis_that_nobody_heard_of_is_asked_for_again(monkeypatch: pytest
 
 
 def test_each_axis_has_its_own_state(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Diagnose on x asks for x alone, and the buttons of y stay free: before the diagnoser has said anything, and while it works for x."""
+    """Diagnose on x is for x only, and the buttons of y stay enabled: before the diagnoser reports, and while it works for x."""
     now = [1000.0]
     monkeypatch.setattr("xy_sysid.page.live.time.monotonic", lambda: now[0])
     heard, deaf = TopicsState(), Deaf()
@@ -78,7 +78,7 @@ def test_each_axis_has_its_own_state(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_live_says_what_is_waited_for_and_which_seconds_were_used() -> None:
-    """Before there is a story: how much of the data is here. Afterwards: from where to where, and how many are newer; they can be used."""
+    """Before a story: the amount of received data. Afterwards: the used range, and the amount of newer data, which can be used."""
     heard = TopicsState()
     link: Any = Deaf()
     page = Live(heard, link, lambda words, done: None)
@@ -106,12 +106,12 @@ def test_live_says_what_is_waited_for_and_which_seconds_were_used() -> None:
 
 
 def deaf_asked(link: Any) -> list[str]:
-    """What a deaf link was asked for."""
+    """The orders to a link that loses them."""
     return list(link.asked)
 
 
 def test_effects_that_the_diagnoser_does_not_begin_with_are_set_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Set and answered, and nothing follows: set once more, twice at most, then it is said; never once the diagnoser has begun."""
+    """Set and answered without a following job: set again, at most twice, then reported; never once the diagnoser has begun."""
     now = [1000.0]
     monkeypatch.setattr("xy_sysid.page.live.time.monotonic", lambda: now[0])
     heard, deaf, said = TopicsState(), Deaf(), []
@@ -137,7 +137,7 @@ def test_effects_that_the_diagnoser_does_not_begin_with_are_set_again(monkeypatc
 
 @needs_ros
 def test_parameters_whose_answer_is_lost_are_set_again(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Over DDS: a node that is silent for longer than an answer may take is asked again, and the order counts as done."""
+    """Over DDS: a call to a node without an answer is repeated, and the order counts as done."""
     from rcl_interfaces.msg import SetParametersResult
     from rcl_interfaces.srv import SetParameters
 
@@ -165,7 +165,7 @@ def test_parameters_whose_answer_is_lost_are_set_again(world: World, monkeypatch
 
 
 def test_what_is_clicked_while_something_is_being_done_comes_after_it_once() -> None:
-    """The last click counts, for the axis that is shown; it is said what comes."""
+    """The last click counts, for the shown axis; the text names the next action."""
     wish = Wish()
     assert wish.words == "" and wish.taken("x") is None
     wish.keep("x", "diagnose")
@@ -177,7 +177,7 @@ def test_what_is_clicked_while_something_is_being_done_comes_after_it_once() -> 
 
 
 def test_a_click_on_its_way_when_the_button_is_disabled_is_heeded() -> None:
-    """What the browser sent before it knew: the server does not drop it."""
+    """A click sent before the browser knew of the disabled button is not dropped."""
     from nicegui import Client, ui
     from nicegui.page import page
 

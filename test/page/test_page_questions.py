@@ -1,4 +1,4 @@
-"""What else is asked of a file on the page: coupling, step tests, servos, a measured response, columns of two files."""
+"""Other analyses of a file on the page: coupling, step tests, servos, a measured response, columns of two files."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def response(folder: Path) -> Path:
 
 @needs_browser
 def test_the_page_answers_what_the_commands_answer(tmp_path: Path) -> None:
-    """Coupling with its picture, a step test in words, a response that was measured elsewhere with its fit, and input and output in two files."""
+    """Coupling with its figure, a step test in words, a response measured elsewhere with its fit, and input and output in two files."""
     two = two_axes(tmp_path)
     u = np.random.default_rng(3).normal(size=3000)
     np.savetxt(tmp_path / "u.csv", u, "%.9g")
@@ -81,14 +81,14 @@ def test_the_page_answers_what_the_commands_answer(tmp_path: Path) -> None:
 
 
 def test_a_measured_response_is_drawn_with_its_fit(tmp_path: Path) -> None:
-    """Picture and words; a file of samples is none."""
+    """Figure and words; a file of samples is not a response."""
     (told,) = (fitted_responses(response(tmp_path), {}) or {}).values()
     assert "PI" not in told["words"] and "gain" in told["words"] and told["figure"]["data"]
     assert fitted_responses(two_axes(tmp_path), {}) is None
 
 
 def test_texts_are_listed_when_asked_for_and_columns_come_from_the_folder_only(tmp_path: Path) -> None:
-    """JSON and text files are most often something else; a column of a file outside the folder is refused."""
+    """JSON and text files are rarely recordings; a column of a file outside the folder is refused."""
     folder = tmp_path / "shelf"
     folder.mkdir()
     for name in ("a.csv", "b.csv", "log.json"):

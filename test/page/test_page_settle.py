@@ -1,4 +1,4 @@
-"""The page designs an experiment, runs it on the machine over DDS, and settles what one recording left open."""
+"""The page designs an experiment, runs it on the machine over DDS, and settles an ambiguous recording."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DRIVE = {**JOINT, **{f"x.{name}": value for name, value in QUIET.items()}, "rate
 
 
 class Scene:
-    """The joint with its nodes, driven so that it hardly swings, a page server, and a tab on it."""
+    """The joint with its nodes, driven with small motion, a page server, and a tab on it."""
 
     def __init__(self, world: World, folder: Path, made: Any) -> None:
         self.world = world
@@ -58,7 +58,7 @@ def scene(tmp_path: Path) -> Iterator[Scene]:
 
 
 def test_run_it_goes_on_by_itself_until_nothing_is_left_to_settle(scene: Scene, tmp_path: Path) -> None:
-    """Design the next experiment, Run it, and the card says what it is. Every step is a bag; afterwards the excitation is as it was."""
+    """Design the next experiment, Run it, and the card names the effect. Every step is a bag; afterwards the settings are restored."""
     tab, world = scene.tab, scene.world
     ready(world, world.statuses(), "ballscrew")
     assert world.transition("excitation", "configure") and world.transition("excitation", "activate")
@@ -74,7 +74,7 @@ def test_run_it_goes_on_by_itself_until_nothing_is_left_to_settle(scene: Scene, 
     run = run_of(folder / "1", "x")
     assert run.output_unit == "rad" and run.seconds >= 0.95 * experiment["seconds"]
     assert float(abs(run.voltage).max()) <= VOLTAGE and float(abs(run.position).max()) < TRAVEL
-    assert load(folder / "1").seq[0] > load(folder / "0").seq[-1]  # the counter goes on, so nobody hears a restart
+    assert load(folder / "1").seq[0] > load(folder / "0").seq[-1]  # the counter continues, so no node detects a restart
     tab.until(lambda: not tab.page.locator("[data-act=end-settle]").is_enabled(), 20, "the walk does not end")
     kind, rms, file = scene.parameters("x.kind", "x.rms", "experiment")
     assert (kind.string_value, rms.double_value, file.string_value) == ("noise", QUIET["rms"], "")

@@ -1,4 +1,4 @@
-"""STOP always works: whatever a message does to the page's link or to a node, by two ways, and confirmed by the machine's state."""
+"""STOP always works, with any message to the page's link or to a node, by two paths, and confirmed by the machine's state."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BRACKETS = "[" * 100_000
 
 
 class Driven:
-    """A machine that is driven, and a page's session that watches it; no browser."""
+    """A driven machine, and a page's session connected to it; no browser."""
 
     def __init__(self, world: World, folder: Path) -> None:
         self.world, self.blocks = world, world.blocks()
@@ -36,10 +36,10 @@ class Driven:
         assert world.transition("excitation", "configure")
 
     def activate(self) -> None:
-        """By the page, and wait until it moves."""
+        """Activate by the page, and wait until it moves."""
         told: list[tuple[bool, str]] = []
         asked: list[int] = []
-        for tries in range(3):  # what starting is refused for on a busy machine passes, and people press again
+        for tries in range(3):  # a refusal on a busy computer is temporary, and people press again
             asked.append(tries)
             self.link.transition("activate", lambda done, words: told.append((done, words)))
             assert self.world.until(lambda: len(told) >= len(asked)), told
@@ -50,7 +50,7 @@ class Driven:
         assert self.world.until(lambda: len(self.blocks) > sent + 5 and bool(self.blocks[-1].values.any()))
 
     def stop(self) -> tuple[bool, str, float]:
-        """What the page is answered, and after how many seconds."""
+        """The answer to the page, and its time in s."""
         begun, answer = time.monotonic(), list[tuple[bool, str]]()
         asking = threading.Thread(target=lambda: answer.append(self.session.stop(5.0)))
         asking.start()
@@ -59,7 +59,7 @@ class Driven:
         return *answer[0], time.monotonic() - begun
 
     def stands(self) -> bool:
-        """The node says inactive, and the last voltage is zero."""
+        """The node is inactive, and the last voltage is zero."""
         self.world.spin(0.2)
         return self.world.state("excitation") == "inactive" and not self.blocks[-1].values.any()
 
@@ -73,7 +73,7 @@ def driven(world: World, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
 
 
 def test_a_story_of_brackets_is_refused_in_words() -> None:
-    """A message that no reader can take is refused with its topic, whatever is in it."""
+    """An unreadable message is refused with its topic, for any content."""
     for text in (BRACKETS, '{"a":' * 50_000, "\x00", "", "[]", "NaN", '{"axis": 1', "\ud800"):
         problem = TopicsState().story("x", text)
         assert problem.startswith("story/x is "), text[:10]
@@ -81,7 +81,7 @@ def test_a_story_of_brackets_is_refused_in_words() -> None:
 
 @needs_ros
 def test_stop_works_after_a_message_that_nobody_can_read(driven: Driven) -> None:
-    """A /xy/story/x of 100,000 brackets: the link lives on, and STOP is confirmed with the voltage at zero, within a second."""
+    """A /xy/story/x of 100,000 brackets: the link continues, and STOP is confirmed with the voltage at zero, within a second."""
     from std_msgs.msg import String
 
     from xy_sysid.nodes.common import LATCHED_QOS
@@ -100,7 +100,7 @@ def test_stop_works_after_a_message_that_nobody_can_read(driven: Driven) -> None
 @needs_ros
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_dead_link_is_said_and_begun_anew_and_stop_works(driven: Driven) -> None:
-    """The link's thread ends: within a second the page says so and has another; orders and STOP reach the machine through it."""
+    """The link's thread ends: within a second the page says so and has a new one, through which orders and STOP reach the machine."""
     driven.activate()
     first = driven.link._line
     driven.link._orders.put(lambda line: sys.exit())
@@ -118,7 +118,7 @@ def test_a_dead_link_is_said_and_begun_anew_and_stop_works(driven: Driven) -> No
 
 @needs_ros
 def test_stop_reaches_the_machine_while_the_link_stands_still(driven: Driven) -> None:
-    """The topic is published by whoever asks: zero volts at once although the link's thread hangs; that it hangs is seen."""
+    """The topic is published from the caller's thread: zero volts at once although the link's thread hangs, which is detected."""
     driven.activate()
     free = threading.Event()
     driven.link._orders.put(lambda line: free.wait(20.0))
@@ -129,7 +129,7 @@ def test_stop_reaches_the_machine_while_the_link_stands_still(driven: Driven) ->
     assert driven.world.until(lambda: len(driven.blocks) > sent and not driven.blocks[-1].values.any(), allowed(0.5))
     assert driven.stands()
     assert driven.world.until(lambda: any("not responded" in message.words for message in driven.session.messages), 8.0)
-    ends = ("stopped: ", "STOP was not confirmed")  # the second where a new link needs longer to find the machine than STOP waits for its word
+    ends = ("stopped: ", "STOP was not confirmed")  # the second if a new link needs longer to find the machine than STOP waits for its confirmation
     assert driven.world.until(lambda: any(message.words.startswith(ends) for message in driven.session.messages), 8.0)
     assert any("stopped: " in message.words for message in driven.session.messages) or allowed(1.0) > 2.0
     free.set()
@@ -138,7 +138,7 @@ def test_stop_reaches_the_machine_while_the_link_stands_still(driven: Driven) ->
 
 @needs_ros
 def test_stop_is_not_confirmed_by_a_machine_that_is_not_there(world: World, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody answers: the page is never told that the machine stands."""
+    """Without an answer the page never reports that the machine has stopped."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(world.domain))
     session = Session(Shelf(tmp_path), live=True)
     try:
@@ -151,7 +151,7 @@ def test_stop_is_not_confirmed_by_a_machine_that_is_not_there(world: World, tmp_
 @needs_ros
 @pytest.mark.parametrize("latched", [True, False])
 def test_the_excitation_hears_stop_by_itself(world: World, latched: bool) -> None:
-    """True on the topic is zero volts and inactive, and activate is refused with the reason until false comes, latched or not."""
+    """True on the topic means zero volts and inactive, and activate is refused with the reason until false arrives, latched or not."""
     from std_msgs.msg import Bool
 
     from xy_sysid.nodes.common import LATCHED_QOS
@@ -164,7 +164,7 @@ def test_the_excitation_hears_stop_by_itself(world: World, latched: bool) -> Non
     process = world.start(EXCITATION, {"watchdog": 2.0, "ramp": 0.0})
     assert world.transition("excitation", "configure")
     assert world.until(lambda: stop.get_subscription_count() >= 1 + latched)
-    if latched:  # asked for before the node was there
+    if latched:  # requested before the node existed
         assert world.until(lambda: "STOP is on (topic stop" in process.output(), 30.0)
         assert not world.transition("excitation", "activate")
         assert world.until(lambda: "STOP is on (topic stop, from test)" in process.output()) and "UNKNOWN" not in process.output()
@@ -192,7 +192,7 @@ BREAKS: dict[str, Callable[[], str]] = {
 @needs_ros
 @pytest.mark.parametrize("node", sorted(BREAKS))
 def test_a_message_that_breaks_a_callback_does_not_end_the_node(world: World, node: str) -> None:
-    """Every callback is walled: the error is told with its place in log and status, and the messages after it are heard."""
+    """Every callback is protected: an error is reported with its place in log and status, and later messages are still received."""
     code = f"""
 import sys, itertools
 {BREAKS[node]()}

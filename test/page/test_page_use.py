@@ -1,4 +1,4 @@
-"""The card *Use the model* in a browser: the command's own words, and files, from the model that is shown."""
+"""The card *Use the model* in a browser: the command's words, and files, for the shown model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ pytestmark = needs_browser
 
 
 def test_numbers_to_paste_and_files_come_from_the_model_that_is_shown(tmp_path: Path) -> None:
-    """kS, kV and kA stand there with their intervals as the command prints them, before and after on the recording, too; nothing lies on anything."""
+    """kS, kV and kA with their intervals as printed by the command, also before and after on the recording; no overlaps."""
     run = recorded("coulomb_friction", seconds=12.0).run("x")
     rows = np.column_stack([np.arange(len(run)) / run.sampling_rate, run.voltage, run.position])
     np.savetxt(tmp_path / "mine.csv", rows, delimiter=",", header="time,x_voltage,x_position", comments="", fmt="%.9g")

@@ -1,4 +1,4 @@
-"""*Use it* on the page of the demo, over DDS: a click stops the excitation, a path is followed, and the tracking errors stand on the page."""
+"""*Use it* on the page of the demo, over DDS: a click stops the excitation, a path is followed, and the page shows the tracking errors."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def story() -> str:
 
 
 class Scene:
-    """A simulated axis with dry friction that the excitation drives, the controller of the demo, a page server, and a tab on it."""
+    """A simulated axis with dry friction, driven by the excitation, the controller of the demo, a page server, and a tab on it."""
 
     def __init__(self, world: World, folder: Path, made: Any) -> None:
         self.world = world
@@ -56,7 +56,7 @@ class Scene:
         self.tab = Tab(made, self.server.address)
 
     def state(self) -> str:
-        """What the card says of the path."""
+        """The card's text about the path."""
         found = self.tab.page.locator("[data-part=use-state]")
         return str(found.text_content()) if found.count() else ""
 
@@ -81,7 +81,7 @@ def test_use_it_follows_the_path_and_shows_that_each_feedforward_makes_the_error
     button = tab.page.locator("[data-act=use-it]")
     assert world.transition("excitation", "configure") and world.transition("excitation", "activate")
     tab.until(button.is_visible, 30)
-    assert button.is_disabled()  # there is no model to be used
+    assert button.is_disabled()  # there is no model yet
     scene.told.publish(String(data=story()))
     tab.until(lambda: button.is_visible() and button.is_enabled(), 30, "a model came, and it cannot be used")
     tab.press_until("use-it", lambda: "not begun" not in scene.state() and "press Use it" not in scene.state(), 30)

@@ -1,4 +1,4 @@
-"""What the page says and decides, without a browser: recordings by name, numbers, nodes, settings, stories."""
+"""Texts and decisions of the page, without a browser: recordings by name, numbers, nodes, settings, stories."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from xy_sysid.settings import AxisExcitation, knobs
 
 
 def test_the_design_knows_the_effects_that_the_page_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The files of --effect-file. The design needs them to simulate a user's own effects."""
+    """The design gets the files of --effect-file, because it simulates a user's own effects."""
     pytest.importorskip("rclpy")
     from xy_sysid.nodes import settle
 
     wished: list[Any] = []
 
     class Settler:
-        """Notes what it is asked for, and ends."""
+        """Stores its arguments, and ends."""
 
         problem, outcome, ending, steps = "", "", "stopped", ()
 
@@ -75,21 +75,21 @@ def shelf(tmp_path: Path) -> Shelf:
 
 
 def test_the_shelf_lists_bags_and_tables_of_its_folder_only(shelf: Shelf) -> None:
-    """No hidden folders, no links that lead elsewhere, nothing that is not a recording."""
+    """No hidden folders, no links to other places, only recordings."""
     assert shelf.names() == ["a.csv", "b.NPZ", "bag", "day/other"]
     assert shelf.find("day/other") == shelf.folder / "day/other"
 
 
 @pytest.mark.parametrize("name", ["../secret.csv", "/etc/passwd", "link.csv", "out/secret.csv", "bag/../../secret.csv", "", ".", "a.csv\0", "bag/"])
 def test_a_name_from_a_browser_never_becomes_a_path_of_its_own(shelf: Shelf, name: str) -> None:
-    """Only what is in the list can be opened, letter by letter."""
+    """Only names in the list can be opened, with exact spelling."""
     with pytest.raises(BadInput, match="recording is"):
         shelf.find(name)
 
 
 @pytest.mark.parametrize("name", ["../x", "a/b", "", ".hidden", "a" * 65, "a b", "x\n", "-rf", "bag", "a\0"])
 def test_a_new_bag_has_a_plain_name_that_is_free(shelf: Shelf, name: str) -> None:
-    """Letters, digits and - _ . only, in the shelf's own folder, never over something."""
+    """Letters, digits and - _ . only, in the folder of the shelf, never over an existing file."""
     with pytest.raises(BadInput, match="name of the bag"):
         shelf.new(name)
     assert shelf.new("xy_2026-01-01_12.5").parent == shelf.folder
@@ -104,7 +104,7 @@ VALUES = {
 
 
 def test_numbers_are_in_people_s_units_with_intervals_and_a_meaning() -> None:
-    """ms and mm/s/V, an interval where there is one, and whether it is good."""
+    """ms and mm/s/V, an interval if there is one, and whether it is good."""
     found = {fact.label: fact for fact in facts(VALUES)}
     assert found["delay"].text == "1.290 [1.280, 1.300] ms"
     assert found["gain"].text == "97 mm/s/V"
@@ -136,7 +136,7 @@ def status(name: str, level: int = 0, message: str = "well", **values: str) -> S
 
 
 def test_a_node_that_falls_silent_is_called_lost_and_comes_back() -> None:
-    """Neither in the graph nor heard for a while is lost; there but silent does not answer."""
+    """A node that is missing in the graph and silent for a while is lost; one in the graph but silent does not answer."""
     heard = TopicsState()
     assert heard.nodes(100.0) == []
     heard.graph({"excitation", "identifier", "mine"}, 10.0)
@@ -157,7 +157,7 @@ def test_a_node_that_falls_silent_is_called_lost_and_comes_back() -> None:
 
 
 def test_the_resonance_is_remembered_until_the_identifier_begins_anew() -> None:
-    """One entry a fit, with the alarm; fewer seconds than before clear it."""
+    """One entry per fit, with the alarm; fewer seconds than before clear the history."""
     heard = TopicsState()
     for seconds, level in ((10.0, 0), (12.0, 0), (14.0, 2)):
         values = tuple({**VALUES, "seconds of data (s)": str(seconds)}.items())
@@ -170,7 +170,7 @@ def test_the_resonance_is_remembered_until_the_identifier_begins_anew() -> None:
 
 
 def test_what_is_not_a_story_is_said_and_left() -> None:
-    """Broken JSON and other documents leave the last story in place."""
+    """Broken JSON and other documents do not replace the last story."""
     heard = TopicsState()
     assert heard.story("x", json.dumps({"axis": "x"})) == "" and heard.stories["x"] == {"axis": "x"}
     assert "not JSON" in heard.story("x", "{") and "not a document" in heard.story("x", "[1]")
@@ -178,7 +178,7 @@ def test_what_is_not_a_story_is_said_and_left() -> None:
 
 
 def responses(lines: int = 400) -> tuple[ArrayMessage, ArrayMessage]:
-    """frf and comparison of a made-up axis whose model fails from 20 to 40 Hz."""
+    """frf and comparison of a synthetic axis whose model fails from 20 to 40 Hz."""
     frequency = np.linspace(0.5, 500, lines)
     response = 1.0 / (2j * np.pi * frequency)
     coherence = np.where(frequency > 300, 0.1, 0.99)
@@ -192,7 +192,7 @@ def responses(lines: int = 400) -> tuple[ArrayMessage, ArrayMessage]:
 
 
 def test_failing_stretches_are_found_and_told_in_words() -> None:
-    """One stretch, with its ends and size; nothing where nothing fails."""
+    """One range, with its ends and size; none for a good model."""
     frf, comparison = responses()
     ((low, high, worst),) = failing(comparison)
     assert 18 < low < 22 and 37 < high < 42 and worst == 50.0
@@ -206,7 +206,7 @@ def test_failing_stretches_are_found_and_told_in_words() -> None:
 
 
 def test_long_responses_are_thinned_without_losing_a_peak() -> None:
-    """Two million lines become about a thousand; the highest of all is still there."""
+    """Two million lines become about a thousand; the highest one is kept."""
     frequency = np.linspace(0.001, 1000, 2_000_000)
     size = np.ones(frequency.size)
     size[1_234_567] = 9.0
@@ -216,7 +216,7 @@ def test_long_responses_are_thinned_without_losing_a_peak() -> None:
 
 
 def test_settings_typed_into_the_page_are_checked_before_they_are_sent() -> None:
-    """Only what differs is sent, with the type that it has; what is not allowed is refused in a sentence."""
+    """Only changed values are sent, with their types; a value out of range is refused in a sentence."""
     now = {item.name: item.value for item in knobs(AxisExcitation())}
     assert changes(now, dict(now)) == {}
     assert changes(now, {"rms": 2, "steps": 30.0, "kind": "sweep"}) == {"rms": 2.0, "steps": 30, "kind": "sweep"}
@@ -256,7 +256,7 @@ def test_the_diagnosis_says_what_how_sure_and_what_came_second() -> None:
 
 
 def test_the_shown_model_is_the_story_s_once_there_is_one() -> None:
-    """Before a story the linear fit, then the newest model unasked; the rigid one and the linear fit are one click away."""
+    """Before a story the linear fit, then the newest model by default; the rigid one and the linear fit are one click away."""
     rigid, grown = {"label": "rigid, with delay", "effects": []}, {"label": "with coulomb_friction", "effects": ["coulomb_friction"]}
     assert views(None, True) == {"linear": "linear fit"} and views(None, False) == {}
     assert list(views({"steps": [rigid]}, True)) == ["now", "linear"]
@@ -266,7 +266,7 @@ def test_the_shown_model_is_the_story_s_once_there_is_one() -> None:
 
 
 def test_a_tile_says_the_worst_and_not_the_usual() -> None:
-    """A coherence of 0.45 in a few lines is named with its frequency, however good the others are; one line alone is not."""
+    """A coherence of 0.45 in a few lines is named with its frequency, even if the others are good; a single line is not."""
     frequency = np.linspace(1.0, 100.0, 100)
     coherence = np.full(100, 0.999)
     coherence[10:16] = 0.45
@@ -289,7 +289,7 @@ def test_a_downloaded_model_is_the_yaml_of_refine() -> None:
 
 
 def test_what_was_said_a_moment_ago_is_one_message(tmp_path: Path) -> None:
-    """STOP by the button and by the key within a second: one line; other words are another."""
+    """STOP by the button and by the key within a second: one message; a different text is a second message."""
     session = Session(Shelf(tmp_path), live=False)
     for words in ("stopped: the voltage is zero", "stopped: the voltage is zero", "recorded a bag"):
         session.say(words, True)
@@ -297,7 +297,7 @@ def test_what_was_said_a_moment_ago_is_one_message(tmp_path: Path) -> None:
 
 
 def test_a_message_stays_from_when_the_page_could_first_show_it() -> None:
-    """A page at work for a minute, or loaded again, has missed nothing; what is older than that is not shown; the newest few at a time."""
+    """A page that was busy for a minute, or reloaded, misses no message; older ones are not shown; at most the newest few at a time."""
     stopped, refused = Message(1, "12:00:00", 100.0, "stopped", True), Message(2, "12:00:00", 100.0, "refused", False)
     notices = Notices(90.0)
     assert notices.shown([], 99.0) == []
@@ -311,19 +311,19 @@ def test_a_message_stays_from_when_the_page_could_first_show_it() -> None:
 
 
 def test_a_picture_is_never_kept_under_a_stamp_that_is_newer_than_its_story() -> None:
-    """Readers take the stamp before the document: whatever comes between them, the next look draws again."""
+    """Readers read the stamp before the document: after a change in between, the next update draws again."""
     heard = TopicsState()
     heard.story("x", json.dumps({"axis": "x", "n": 1}))
     seen = heard.version["story x"], heard.stories["x"]["n"]
     heard.story("x", json.dumps({"axis": "x", "n": 2}))
-    assert seen == (1, 1) and heard.version["story x"] == 2  # the document is exchanged before its version grows
+    assert seen == (1, 1) and heard.version["story x"] == 2  # the document is replaced before its version grows
     source = (ROOT / "xy_sysid" / "page" / "story_card.py").read_text(encoding="utf-8")
     refresh = source[source.index("async def refresh") :]
     assert refresh.index("self._source.stamp(axis)") < refresh.index("self._source.document(axis)") and refresh.count("source.stamp(") == 1
 
 
 def test_a_stop_of_somebody_else_is_named_and_the_pages_own_is_not() -> None:
-    """Activate releases the page's own STOP by itself; whoever else holds it is told, also another page and one that has gone."""
+    """Activate releases the page's own STOP; other holders are named, also another page and one that has ended."""
     heard = TopicsState(own_stop="page_stop_here_1")
     assert heard.stopped_by_others() == ""
     other, gone = "page_stop_there_1", "page_stop_here_0 (gone)"
@@ -333,7 +333,7 @@ def test_a_stop_of_somebody_else_is_named_and_the_pages_own_is_not() -> None:
 
 
 def test_the_button_to_activate_says_what_it_does_with_stop() -> None:
-    """The page releases its own STOP by itself; that of somebody else it can only override, and both texts say so."""
+    """The page releases its own STOP; that of another node it can only override, and both texts say so."""
     assert on_activate(False, "") == ("Activate", "")
     button, told = on_activate(True, "")
     assert button == "Release STOP and activate" and "releases it first" in told

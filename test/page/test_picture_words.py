@@ -1,4 +1,4 @@
-"""What stands under a picture is true of every recording: it names no length of time and no place that another recording shows elsewhere."""
+"""The text below a figure is true for every recording: it names no duration and no place that depends on the recording."""
 
 from __future__ import annotations
 
@@ -17,6 +17,6 @@ OF_ONE_RECORDING = r"half a second|[1-9][\d.]*\s*(?:ms|s|seconds?)\b|friction ne
 
 @pytest.mark.parametrize("name", FIXED)
 def test_a_fixed_text_says_nothing_that_only_one_recording_shows(name: str) -> None:
-    """How long an excerpt is, where friction stands on the axis of speed, and which part was held out: the figure draws that."""
+    """The length of an excerpt, the place of friction on the axis of speed, and the held-out part are only in the figure."""
     found = re.search(OF_ONE_RECORDING, FIXED[name])
     assert found is None, found

@@ -36,7 +36,7 @@ def server(folder: Path) -> Iterator[Server]:
 @needs_browser
 @pytest.mark.parametrize("width", [1400, 400])
 def test_a_table_is_opened_and_its_change_is_told_as_by_the_command(server: Server, folder: Path, width: int) -> None:
-    """One button: the sentences of ``xy-sysid trend``, the changed parameter of the changed axis, and that of all axes; nothing is too wide."""
+    """One button: the sentences of ``xy-sysid trend``, the changed parameter of the changed axis, and that of all axes; the page fits the width."""
     with browser() as chromium:
         tab = Tab(chromium, server.address, width)
         tab.until(lambda: tab.page.locator("[data-act=trend]:visible").count() == 1)
@@ -52,7 +52,7 @@ def test_a_table_is_opened_and_its_change_is_told_as_by_the_command(server: Serv
 
 
 def drawn(tab: Tab, label: str) -> bool:
-    """The figure of that description has data."""
+    """True if the figure with that description has data."""
     plot: Any = tab.page.locator(f"#trend .js-plotly-plot[aria-label^='{label}'] .scatterlayer .trace")
     return bool(plot.count())
 
@@ -67,7 +67,7 @@ def test_only_folders_of_the_shelf_that_are_tables_can_be_opened(folder: Path) -
 
 
 def test_a_folder_that_cannot_be_read_has_no_table(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """lost+found on a disk of its own belongs to root: the page opens, with all other tables."""
+    """An unreadable folder, such as lost+found: the page opens, with all other tables."""
     closed, scan = folder / "lost+found", os.scandir
     closed.mkdir()
 
@@ -83,7 +83,7 @@ def test_a_folder_that_cannot_be_read_has_no_table(folder: Path, monkeypatch: py
 
 
 def test_no_recording_is_asked_for_its_status(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Names tell which folders are tables: thousands of recordings on a share would keep the page waiting."""
+    """Tables are found by names alone: opening thousands of recordings on a network share would take too long."""
     status = Path.stat
 
     def asked(path: Path, **how: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Work that another process does while this one goes on, and what becomes of it when that process dies."""
+"""Work of a parallel process, and its result if that process ends."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from xy_sysid.processes.helper import Helper
 
 
 def test_another_process_works_and_answers_in_order() -> None:
-    """Each result is waited for when it is needed."""
+    """The caller waits for each result only when it is needed."""
     with Helper("xy_sysid.errors") as helper:
         other, total, mine = helper.begin(os.getpid), helper.begin(operator.add, 2, 3), os.getpid()
         assert total() == 5 and other() != mine
 
 
 def test_what_a_helper_that_died_left_is_done_here() -> None:
-    """By the error of a function, which is raised here as it is, or killed."""
+    """By an error of a function, which is raised here unchanged, or killed."""
     with Helper("xy_sysid.errors") as helper:
         wrong, after = helper.begin(operator.truediv, 1, 0), helper.begin(os.getpid)
         with pytest.raises(ZeroDivisionError):
@@ -39,7 +39,7 @@ def test_who_leaves_does_not_wait_for_what_nobody_needs_any_more() -> None:
 
 
 def test_on_one_core_nothing_is_begun(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The result is made when it is asked for."""
+    """The result is computed at the call."""
     monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
     with Helper("xy_sysid.errors") as helper:
         assert helper.begin(os.getpid)() == os.getpid()

@@ -1,4 +1,4 @@
-"""Run files and parameter files: what they become, and how a slip in them is told."""
+"""Run files and parameter files: their result, and the errors for mistakes in them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def planned(text: str) -> list[tuple[str, str]]:
 
 
 def test_listeners_start_first_and_the_excitation_last() -> None:
-    """Start order is the reverse of stop order, whatever the order in the file."""
+    """Start order is the reverse of stop order, for any order in the file."""
     names = [
         name for name, _ in planned("nodes: [{executable: excitation}, {executable: ballscrew}, {executable: identifier}, {executable: recorder}]")
     ]
@@ -31,7 +31,7 @@ def test_listeners_start_first_and_the_excitation_last() -> None:
 
 
 def test_an_entry_becomes_a_command_with_names_namespace_and_parameters_in_the_node_s_types() -> None:
-    """name, namespace, params_file, parameters, remap and env arrive; a whole number for a float parameter becomes a float."""
+    """name, namespace, params_file, parameters, remap and env are applied; an integer for a float parameter becomes a float."""
     (spec,) = plan(
         "env: {ROS_DOMAIN_ID: 7}\nnodes:\n- executable: excitation\n  name: drive\n  namespace: /m\n  params_file: p.yaml\n"
         '  parameters: {"x": {rms: 2}, block: 10}\n  remap: {voltage: u}\n  restart: true',
@@ -65,7 +65,7 @@ def test_an_entry_becomes_a_command_with_names_namespace_and_parameters_in_the_n
     ],
 )
 def test_a_slip_in_a_run_file_is_one_line_with_the_nearest_spelling(text: str, words: tuple[str, ...]) -> None:
-    """The message names the value, what is allowed and what to do, in one line."""
+    """The message gives the value, the allowed values and the next action, in one line."""
     with pytest.raises(BadInput) as caught:
         planned(text)
     message = str(caught.value)
@@ -88,7 +88,7 @@ def test_a_slip_in_a_run_file_is_one_line_with_the_nearest_spelling(text: str, w
     ],
 )
 def test_a_slip_in_a_parameter_file_is_told_before_a_node_sees_it(text: str, words: tuple[str, ...]) -> None:
-    """ROS ignores an unknown parameter and dies of a bare y; here both are one clear line."""
+    """ROS ignores an unknown parameter and fails for a bare y; here both are one clear line."""
     with pytest.raises(BadInput) as caught:
         parameters(text, "p.yaml")
     for word in words:
@@ -96,7 +96,7 @@ def test_a_slip_in_a_parameter_file_is_told_before_a_node_sees_it(text: str, wor
 
 
 def test_a_section_for_all_nodes_reaches_those_that_know_the_name() -> None:
-    """/** gives each node the parameters it has."""
+    """/** gives each node those parameters that it has."""
     assert parameters("/**:\n  ros__parameters: {rate: 1000, length: 1024}", "p.yaml") == {
         "excitation": {"rate": 1000.0},
         "identifier": {"length": 1024},
@@ -104,7 +104,7 @@ def test_a_section_for_all_nodes_reaches_those_that_know_the_name() -> None:
 
 
 def test_the_default_file_is_what_the_settings_say() -> None:
-    """config/default.yaml holds every knob of every node at its default, and nothing else."""
+    """config/default.yaml contains exactly all settings of every node at their defaults."""
     text = (HERE / "config" / "default.yaml").read_text(encoding="utf-8")
     assert text == default_text(), "run: python -m xy_sysid.files.ros_parameters > config/default.yaml"
     assert parameters(text, "default.yaml") == {
@@ -114,13 +114,13 @@ def test_the_default_file_is_what_the_settings_say() -> None:
 
 @pytest.mark.parametrize("name", ["demo", "real.yaml", str(HERE / "config" / "demo.yaml")])
 def test_the_run_files_that_come_along_are_sound(name: str) -> None:
-    """Found by name or path; every parameter in them is a known knob and the parameter files they name exist."""
+    """Found by name or path; every parameter in them is a known setting, and their parameter files exist."""
     specs = starter.load(name)
     assert specs[-1].name == "excitation"
 
 
 def test_a_real_machine_gets_the_network_profile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """real.yaml and a copy of it elsewhere: the profile's full path; one beside the file comes first, one that is set already stays, none is told."""
+    """real.yaml and a copy of it: full path of the profile; one next to the file has precedence; a set variable is kept."""
     monkeypatch.delenv(starter.PROFILE, raising=False)
     package = str((share() / "config" / "fastdds.xml").resolve())
     assert all(dict(spec.env)[starter.PROFILE] == package for spec in starter.load("real.yaml"))
@@ -151,7 +151,7 @@ def test_a_parameter_file_that_is_not_there_is_told(tmp_path: Path) -> None:
 
 
 def test_shipped_files_are_found_in_a_source_tree_and_in_an_installation(tmp_path: Path) -> None:
-    """Beside the package in a source tree; in share/xy_sysid of the prefix in an installation; else one clear line."""
+    """Next to the package in a source tree; in share/xy_sysid of the prefix in an installation; otherwise one clear line."""
     assert share() == HERE
     module = tmp_path / "lib" / "python3.12" / "site-packages" / "xy_sysid" / "files" / "package_files.py"
     module.parent.mkdir(parents=True)
@@ -163,7 +163,7 @@ def test_shipped_files_are_found_in_a_source_tree_and_in_an_installation(tmp_pat
 
 
 def test_axes_of_other_names_go_with_the_default_file() -> None:
-    """axes and their settings are known, those of x and y in default.yaml are not used; a misspelt axis or setting is still named."""
+    """Other axes and their settings are accepted, those of x and y in default.yaml are ignored; a misspelt axis or setting is an error."""
     given = {"axes": ["pan", "x"], "pan": {"rms": 0.5}, "y": {"rms": 2.0}, "rate": 500}
     assert checked("excitation", given, "p.yaml") == {"axes": ["pan", "x"], "rate": 500.0, "pan.rms": 0.5}
     assert parameters(default_text().replace('["x", "y"]', '["pan"]'), "default.yaml")["excitation"]["axes"] == ["pan"]

@@ -26,7 +26,7 @@ def stand_in(name: str, code: str, rank: int = 0, restart: bool = False, optiona
 
 
 class Ears:
-    """Keeps what was said, and has had enough when the line waited for has come so often."""
+    """Stores the output, and stops the run after a number of occurrences of a line."""
 
     def __init__(self, wait_for: str = "", times: int = 1) -> None:
         self.lines: list[str] = []
@@ -43,7 +43,7 @@ class Ears:
 
 
 def test_each_line_says_which_node_wrote_it() -> None:
-    """Output lines carry the node's name, aligned; a last line without an end is not lost; bad bytes don't hurt."""
+    """Output lines have the node's name, aligned; a last line without an end is not lost; bad bytes are accepted."""
     ears = Ears()
     heard: list[tuple[str, str]] = []
     talk = "import sys,os;print('hello');sys.stdout.flush();os.write(1,b'\\xff half a line')"
@@ -55,13 +55,13 @@ def test_each_line_says_which_node_wrote_it() -> None:
 
 
 def test_what_a_node_writes_cannot_steer_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    """A name from the network that a node repeats is shown, and sets neither title nor colours."""
+    """A name from the network in a node's output is shown without setting title or colours."""
     assert run([stand_in("a", "print('joint \\x1b]0;mine\\x07 is not there')")]) == 0
     assert "a | joint ␛]0;mine␇ is not there" in capsys.readouterr().out.splitlines()
 
 
 def test_the_excitation_is_stopped_first_and_the_machine_last() -> None:
-    """Stopping goes rank by rank: nobody is asked to stop before everybody of a lower rank has ended."""
+    """Nodes stop rank by rank: none is asked to stop before all of a lower rank have ended."""
     ears = Ears("up", 3)
     specs = [stand_in("machine", POLITE, 3), stand_in("identifier", POLITE, 1), stand_in("excitation", POLITE, 0)]
     assert run(specs, ears.say, enough=ears.enough, grace=QUICK) == 0
@@ -88,7 +88,7 @@ def test_a_stubborn_node_is_asked_more_firmly_and_killed_in_the_end() -> None:
 
 
 def test_a_node_that_may_restart_does_and_keeps_the_others_running() -> None:
-    """restart: a death leads to a new start, and the run goes on."""
+    """restart: a node that dies is started again, and the run continues."""
     ears = Ears("once more", 2)
     phoenix = stand_in("phoenix", "print('once more');raise SystemExit(1)", restart=True)
     assert run([stand_in("calm", POLITE, 1), phoenix], ears.say, enough=ears.enough, grace=QUICK) == 0
@@ -97,14 +97,14 @@ def test_a_node_that_may_restart_does_and_keeps_the_others_running() -> None:
 
 
 def test_an_optional_node_may_end() -> None:
-    """optional: the others go on, and the run ends when it is told to."""
+    """optional: the others continue, and the run ends on request."""
     ears = Ears("the others continue")
     assert run([stand_in("calm", POLITE, 1), stand_in("brief", "print('done')", optional=True)], ears.say, enough=ears.enough, grace=QUICK) == 0
     assert "brief ended; the others continue" in ears.lines
 
 
 def test_a_program_that_does_not_exist_stops_what_was_started() -> None:
-    """A command that cannot start ends the run with code 1 and its name; nobody is left behind."""
+    """A command that cannot start ends the run with code 1 and its name; no process is left."""
     ears = Ears()
     assert run([stand_in("calm", POLITE, 1), ProcessSpec("ghost", ("/nonexistent/program",))], ears.say, grace=QUICK) == 1
     assert any(line.startswith("ghost died") for line in ears.lines)
@@ -112,7 +112,7 @@ def test_a_program_that_does_not_exist_stops_what_was_started() -> None:
 
 @pytest.mark.parametrize(("number", "expected"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_ctrl_c_and_sigterm_end_in_order_with_their_code(number: signal.Signals, expected: int, tmp_path: Path) -> None:
-    """Ctrl-C returns 130, SIGTERM 143; the node says its last word and no process stays behind; a second Ctrl-C changes nothing."""
+    """Ctrl-C returns 130, SIGTERM 143; the node's last output is shown and no process is left; a second Ctrl-C changes nothing."""
     starter = subprocess.Popen(
         [sys.executable, "-c", f"{_script()}\nsys.exit(run([ProcessSpec('node',(sys.executable,'-S','-c',{POLITE!r}))]))"],
         stdout=subprocess.PIPE,
@@ -130,7 +130,7 @@ def test_ctrl_c_and_sigterm_end_in_order_with_their_code(number: signal.Signals,
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the kernel's help is asked for on Linux only")
 def test_nodes_stop_when_the_starter_is_killed() -> None:
-    """kill -9 of the starter still interrupts the nodes, so that nobody drives on unattended."""
+    """kill -9 of the starter still interrupts the nodes, so that none drives unattended."""
     code = "import os,signal,time;print(os.getpid());signal.pause()"
     starter = subprocess.Popen(
         [sys.executable, "-c", f"{_script()}\nrun([ProcessSpec('node',(sys.executable,'-S','-c',{code!r}))])"],

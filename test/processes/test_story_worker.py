@@ -1,4 +1,4 @@
-"""The process that works on stories: steps come as they are done, a killed or cancelled one is no end, and none is left."""
+"""The process that works on stories: each step is reported when done, a killed or cancelled process is replaced, and none is left."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def job(effects: tuple[str, ...] = ()) -> Job:
 
 
 def until(worker: StoryWorker, done: Callable[[JobNews], bool]) -> list[JobNews]:
-    """News up to the one that does."""
+    """News up to the first that meets the condition."""
     heard: list[JobNews] = []
-    end = time.monotonic() + PATIENCE * 120.0  # stories are told at the lowest priority
+    end = time.monotonic() + PATIENCE * 120.0  # stories are computed at the lowest priority
     while time.monotonic() < end:
         heard += worker.news()
         if any(done(item) for item in heard):

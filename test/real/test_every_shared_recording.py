@@ -1,4 +1,4 @@
-"""Every recording of a real machine that we have, through the commands that read one."""
+"""Every available recording of a real machine with the commands that read recordings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from xy_sysid.samples.recording import Recording
 
 @pytest.fixture(scope="module", autouse=True)
 def read_once() -> Iterator[None]:
-    """What one command has read, the next one takes, if it is read in the same way."""
+    """Recordings are cached between commands that read them with the same options."""
     kept: dict[str, Recording] = {}
 
     def taken(path: Path, reading: Reading, **options: Any) -> Recording:
@@ -53,12 +53,12 @@ def test_the_other_commands_answer_for_one_of_them(name: str, tmp_path: Path) ->
 
 
 def test_every_file_is_in_the_table() -> None:
-    """A recording that is new is walked through, too: add it to campaigns/faults/shared.py with the options that it needs."""
+    """A new recording must be in campaigns/faults/shared.py with its options."""
     assert unnamed(data("")) == []
 
 
 def test_a_new_file_is_noticed(tmp_path: Path) -> None:
-    """Beside those that the table names, and in a folder of its own."""
+    """Next to those of the table, and in a separate folder."""
     for name in ("README.md", "emps/emps_train.npz", "joint_state_bags/roblab_hw4/rosbag.db3", "emps/new.csv", "new/a.npz"):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)

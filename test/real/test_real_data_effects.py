@@ -1,4 +1,4 @@
-"""Recordings of real machines and the effects in them: the figures of docs/real-machines.md, by the commands that it names."""
+"""Recordings of real machines and their effects: the numbers of docs/real-machines.md, by its commands."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def value(found: Any, name: str) -> float:
 
 
 def power_gone(found: Any, rung: int = -1) -> float:
-    """Part of the rigid model's held-out error power that is gone."""
+    """Explained fraction of the rigid model's held-out error power."""
     return 1.0 - float(found["ladder"][rung]["held_out_error"] / found["ladder"][0]["held_out_error"]) ** 2
 
 
 def test_emps_falls_rung_by_rung_to_friction_direction_and_cogging() -> None:
-    """Mass within 2 %, Coulomb within 10 %, at least 95 % of the held-out error power gone, cogging at 2.5 mm; not called explained."""
+    """Mass within 2 %, Coulomb within 10 %, at least 95 % of the held-out error power explained, cogging at 2.5 mm; not called explained."""
     found = refined(EMPS, *ADDED)
     assert [rung["added"] for rung in found["ladder"]] == [None, *NAMES]
     assert FORCE / (value(found, "gain") * value(found, "pole")) == pytest.approx(95.1089, rel=0.02)
@@ -53,7 +53,7 @@ def test_emps_falls_rung_by_rung_to_friction_direction_and_cogging() -> None:
 
 
 def test_the_position_of_emps_is_simulated_from_the_voltage_alone() -> None:
-    """Off by at most 2.5 mm rms over the whole record with --open-loop; mass, which may move, and friction still near the published ones."""
+    """At most 2.5 mm rms error over the full record with --open-loop; mass and friction still near the published ones."""
     found = refined(EMPS, *ADDED, "--open-loop")
     assert found["open_loop"]["rms"] <= 2.5e-3
     assert FORCE / (value(found, "gain") * value(found, "pole")) == pytest.approx(95.1089, rel=0.03)
@@ -62,7 +62,7 @@ def test_the_position_of_emps_is_simulated_from_the_voltage_alone() -> None:
 
 
 def test_settling_keeps_what_the_fast_motion_knows_better() -> None:
-    """Delay and cogging stay; the position comes nearer; the held-out error stays that of the fit that did not see it."""
+    """Delay and cogging are kept; the position error is smaller; the held-out error remains that of the original fit."""
     recording = load(data(EMPS))
     u, y = recording.axis("x")
     axis = prepare(recording.sampling_rate, u, y)
@@ -94,7 +94,7 @@ def test_the_linear_guide_shows_its_mode_its_spring_and_its_friction(tmp_path: A
 
 
 def test_a_servo_with_a_pendulum_carries_its_weight() -> None:
-    """Friction alone explains less; with the weight 95 % of the held-out motion is simulated from the voltage, and the arm hangs at 0."""
+    """Friction alone explains less; with gravity 95 % of the held-out motion is simulated from the voltage, and the arm hangs at 0."""
     recording = load(data("bam_servo/bam_xl330_sin_time_square_kp800_even.npz"))
     axis = prepare(recording.sampling_rate, *recording.axis(recording.axes[0]))
     base = fit_base(axis)

@@ -1,4 +1,4 @@
-"""Recordings of real machines: the figures of docs/real-data.md, by the commands that it names."""
+"""Recordings of real machines: the numbers of docs/real-data.md, by its commands."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def failed(found: Any) -> set[str]:
     ],
 )
 def test_the_two_inertia_bench_shows_its_pair(options: tuple[str, ...], relative_error: float) -> None:
-    """Antiresonance 53.9 Hz and resonance 76.2 Hz within 0.3 Hz by every way; the error is reported, and that noise does not explain it."""
+    """Antiresonance 53.9 Hz and resonance 76.2 Hz within 0.3 Hz by every method; the error is reported as larger than noise."""
     found = fitted("two_inertia_bench/multisineA.npz", *BENCH, *options)
     assert found["period"] == 2500 and found["lines"] == 240
     assert value(found, "antiresonance_1.frequency") == pytest.approx(53.9, abs=0.3)
@@ -54,7 +54,7 @@ def test_the_two_inertia_bench_shows_its_pair(options: tuple[str, ...], relative
 
 
 def test_the_bench_is_asked_whether_its_input_is_held() -> None:
-    """With the hold the delay ends at 0 and a verdict says so; without it, 0.12 ms."""
+    """With the hold the delay is at its bound 0 and a verdict says so; without it, 0.12 ms."""
     held = fitted("two_inertia_bench/multisineA.npz", *BENCH, "--weighting", "relative")
     assert "delay" in failed(held) and value(held, "delay") == 0.0
     free = fitted("two_inertia_bench/multisineA.npz", *BENCH, "--weighting", "relative", "--set", "hold=none")
@@ -72,7 +72,7 @@ def test_the_bench_is_asked_whether_its_input_is_held() -> None:
 def test_the_linear_guide_shows_its_zeros_and_poles(
     name: str, options: tuple[str, ...], zero: float, pole: float, slow: float, relative_error: float
 ) -> None:
-    """Near 11.8, 13.5 and 0.8 Hz; the period of 4999 samples is found; the negative gain and the friction distortion are said."""
+    """Near 11.8, 13.5 and 0.8 Hz; the period of 4999 samples is found; negative gain and friction distortion are reported."""
     found = fitted(f"lsb250/lsb250_{name}.npz", *GUIDE, *options)
     assert found["period"] == 4999 and found["lines"] == 100
     assert value(found, "antiresonance_1.frequency") == pytest.approx(zero, abs=0.05)
@@ -85,7 +85,7 @@ def test_the_linear_guide_shows_its_zeros_and_poles(
 
 
 def test_the_second_recording_of_the_guide_shows_what_the_model_is_worth(tmp_path: Path) -> None:
-    """Off by 18 % where noise allows 0.3 %, and half of the position explained: the machine is not linear, and it is said."""
+    """An error of 18 % with noise of 0.3 %, and half of the position explained: the machine is not linear, and the answer says so."""
     model = tmp_path / "lsb.yaml"
     assert cli("fit", data("lsb250/lsb250_exp1.npz"), *GUIDE, "--weighting", "relative", "--model", model).code == 0
     said = cli("validate", data("lsb250/lsb250_exp2.npz"), model, *GUIDE_BAND, "--json").json
@@ -113,7 +113,7 @@ def test_emps_gives_its_mass_and_warns_of_feedback_and_friction() -> None:
 
 
 def test_the_robot_reads_and_says_for_each_joint_why_not() -> None:
-    """Windows fit the 27 s by themselves; no joint has more coherent lines than chance gives, and fit says that none can be trusted."""
+    """The window is adapted to the 27 s; no joint has more coherent lines than by chance, and fit says that none can be trusted."""
     bag = data("joint_state_bags/unisa_ur10_exciting")
     said = cli("frf", bag, "--json")
     axes = said.json["axes"]
@@ -126,7 +126,7 @@ def test_the_robot_reads_and_says_for_each_joint_why_not() -> None:
 
 
 def test_the_malformed_bag_is_one_line() -> None:
-    """What is missing and what is there, for every command that reads."""
+    """The missing and the existing columns, for every reading command."""
     bag = data("joint_state_bags/roblab_hw4")
     for command in ("fit", "frf", "replay"):
         line = refused(command, bag)

@@ -1,4 +1,4 @@
-"""What the authors of a recording published of their machine, and what ``refine`` finds of it."""
+"""Published parameters of recorded machines, compared with those of ``refine``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def left(found: Any) -> float:
 def test_the_friction_of_two_joints_of_a_robot_is_that_of_least_squares() -> None:
     """UR10e: Coulomb and viscous friction within 3 % of plain least squares and 10 % of the published ones; errors of 26 and 45 mrad/s at most.
 
-    Plain least squares leaves 24 and 34 mrad/s of the whole recording, and the rigid model 96 and 134 of the held-out windows.
+    Least squares has errors of 24 and 34 mrad/s on the full recording, the rigid model 96 and 134 on the held-out windows.
     """
     wrist = refined("ur10e/ur-20_01_22-joint_6.csv", "--map", "time=1,input=19,output=7", "--unit", "input=A,output=rad", "--add", "coulomb_friction")
     assert value(wrist, "coulomb_friction.coulomb") == approx(0.243, rel=0.03)

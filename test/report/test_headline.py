@@ -1,4 +1,4 @@
-"""The line that says where an axis stands: one state at a time, from what is missing to what is explained, and the act that is next."""
+"""The headline of an axis: one state at a time, from missing to explained, and the next action."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from xy_sysid.story.story import Story, removed
 
 
 def with_steps(count: int, diagnosed: bool = True) -> dict[str, Any]:
-    """The told story, as it was after so many steps."""
+    """The finished story as it was after this many steps."""
     from dataclasses import replace
 
     story: Story = told()
@@ -28,7 +28,7 @@ def with_steps(count: int, diagnosed: bool = True) -> dict[str, Any]:
 
 
 def test_the_headline_goes_from_missing_over_adding_to_explained() -> None:
-    """Each state alone: what is missing is not said beside what is explained, nor either while something is added."""
+    """One state only: missing, explained, or being added."""
     base, found, grown = with_steps(1, diagnosed=False), with_steps(1), with_steps(2)
     assert headline(None) == "Not fitted yet" and next_act(None) is None
     assert headline(base).startswith("Something is missing: ") and next_act(base) == ("diagnose", "")
@@ -43,7 +43,7 @@ def test_the_headline_goes_from_missing_over_adding_to_explained() -> None:
 
 
 def test_taking_the_effect_out_makes_the_headline_fall_back() -> None:
-    """After Remove the model is rigid again and something is missing again, with the same act as before."""
+    """After Remove the model is rigid again, an effect is missing again, and the next action is the same as before."""
     back = document(removed(told(), Run("x", RATE, *data()), "coulomb_friction"))
     assert headline(back).startswith("Something is missing: ") and next_act(back) == ("add", "coulomb_friction")
 
@@ -74,7 +74,7 @@ def test_the_first_picture_shows_where_the_model_fails_and_how_far_it_falls(by: 
 
 
 def test_the_numbers_of_a_figure_come_as_a_table() -> None:
-    """Named by curve and axis with its unit; whoever reads them back has what was drawn."""
+    """Named by curve and axis with its unit; the numbers are those of the figure."""
     figure = go.Figure(go.Scatter(x=np.array([1.0, 2.0, 4.0]), y=[0.5, None, 2.0], name="model"))
     figure.update_layout(xaxis_title="frequency (Hz)", yaxis_title="error, of the floor")
     lines = table(json.loads(figure.to_json())).splitlines()

@@ -1,4 +1,4 @@
-"""One noise floor: headline, tiles, ladder, pictures and the command compare say the same number, by the same definition."""
+"""One noise floor: headline, tiles, ladder, figures and the command compare use the same number, by the same definition."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def story(run: Run) -> dict[str, Any]:
 
 
 def test_every_picture_averages_to_the_number_of_the_headline(story: dict[str, Any]) -> None:
-    """The mean power of the error over the floor in bins of speed, position and time is that of the whole."""
+    """The mean power of the error over the floor in bins of speed, position and time is that of the full data."""
     base = story["ladder"][0]
     ratio = base["held_out_error"] / base["noise_floor"]
     assert ratio > 5 and f"{number(ratio, 2)} times the noise floor" in headline(story)
@@ -41,11 +41,11 @@ def test_every_picture_averages_to_the_number_of_the_headline(story: dict[str, A
         bins = np.array(story["steps"][0]["pictures"]["residual"][kind]["error_over_floor"])
         assert np.sqrt(np.mean(bins**2)) == pytest.approx(ratio, rel=0.05), kind
     lines = story["steps"][0]["pictures"]["residual"]["frequency"]["error_over_floor"]
-    assert max(lines) > ratio  # the worst band is at least the whole
+    assert max(lines) > ratio  # the worst band is at least the overall value
 
 
 def test_tiles_and_compare_have_the_floor_of_the_ladder(story: dict[str, Any], run: Run) -> None:
-    """The tile shows it as it is, and compare finds it to 2 % from the part that it looks at."""
+    """The tile shows this number, and compare finds it within 2 % from its part of the data."""
     floor = story["ladder"][0]["noise_floor"]
     (tile,) = [fact for fact in story_facts(story) if fact.label == "noise floor"]
     assert tile.text == moved(floor, "m/s", 3)
@@ -53,7 +53,7 @@ def test_tiles_and_compare_have_the_floor_of_the_ladder(story: dict[str, Any], r
 
 
 def test_commands_report_and_page_say_the_floor_of_the_ladder(story: dict[str, Any], run: Run, tmp_path: Path) -> None:
-    """diagnose and refine have it in their documents, diagnose in its sentence where nothing is missing, and the report in its summary."""
+    """diagnose and refine have it in their documents, diagnose in its sentence if nothing is missing, and the report in its summary."""
     floor = story["ladder"][0]["noise_floor"]
     recording = simulate(20.0, effects=["cogging"], machine="rigid.yaml")
     save(recording, tmp_path / "rec.npz")
@@ -66,7 +66,7 @@ def test_commands_report_and_page_say_the_floor_of_the_ladder(story: dict[str, A
 
 
 def test_what_is_held_out_is_shaded_where_it_lies(story: dict[str, Any]) -> None:
-    """A third of the record, in stretches over all of it, and the figures in time shade just these."""
+    """A third of the record, in stretches all over it, and the figures in time shade exactly these."""
     spans = story["measured"]["time"]["held_out"]
     part = sum(last - first for first, last in spans) / story["seconds"]
     assert len(spans) > 2 and 0.2 < part < 0.45 and spans[0][0] < 0.4 * story["seconds"] < 0.6 * story["seconds"] < spans[-1][1]
@@ -76,6 +76,6 @@ def test_what_is_held_out_is_shaded_where_it_lies(story: dict[str, Any]) -> None
 
 
 def test_the_coherence_of_the_recording_is_no_fault_of_the_model(story: dict[str, Any]) -> None:
-    """It belongs to a linear response: never red, and it says so."""
+    """It belongs to a linear response: never red, with a note."""
     (tile,) = [fact for fact in story_facts(story) if fact.label == "linear part"]
     assert tile.good is None and "property of the recording, not of this model" in tile.meaning

@@ -1,4 +1,4 @@
-"""The report: whole, honest about what it cannot say, safe, and one file."""
+"""The report: complete, with reasons for missing results, safe, and one file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def answer(folder: Path) -> dict[str, Any]:
-    """What the command says; it writes the page."""
+    """The output of the command, which writes the page."""
     said = cli("report", folder / "rec.npz", "-o", folder / "out.html", "--json")
     assert said.code == 0, said
     document: dict[str, Any] = said.json
@@ -44,7 +44,7 @@ def words_of(page: str) -> str:
 
 
 def test_the_report_is_one_file_that_needs_no_network(page: str, answer: dict[str, Any]) -> None:
-    """No source or link leaves the file, and it is below 8 MB."""
+    """No external source or link, and below 8 MB."""
     for tag, attributes in parsed(page).tags:
         assert tag not in ("link", "iframe", "base", "img"), tag
         assert not {"src", "srcset", "action"} & set(attributes)
@@ -53,7 +53,7 @@ def test_the_report_is_one_file_that_needs_no_network(page: str, answer: dict[st
 
 
 def test_a_manager_reads_the_summary_first(page: str) -> None:
-    """Each axis has a verdict in words, the size of the error against the motion and the noise, and the falling ladder beside it."""
+    """Each axis has a verdict in words, the error relative to motion and noise, and the falling error ladder."""
     text = words_of(page).partition("Provenance")[2]  # behind the links at the top
     assert text.index("Summary") < text.index("A rigid axis with delay and coulomb friction") < text.index("Remarks")
     assert "is sufficient: the data show no missing effect" in text
@@ -63,7 +63,7 @@ def test_a_manager_reads_the_summary_first(page: str) -> None:
 
 
 def test_every_part_of_the_report_is_there(page: str) -> None:
-    """Summary, experiment, response, fits, one part per axis, provenance, each reachable from the top; words for every picture."""
+    """Summary, experiment, response, fits, one part per axis, provenance, each linked from the top; words for every figure."""
     found = parsed(page)
     ids = {attributes["id"] for _, attributes in found.tags if "id" in attributes}
     links = {str(attributes["href"])[1:] for tag, attributes in found.tags if tag == "a"}
@@ -83,7 +83,7 @@ def test_every_part_of_the_report_is_there(page: str) -> None:
 
 
 def test_the_numbers_are_those_of_the_story(page: str, answer: dict[str, Any]) -> None:
-    """Parameters of the table come with their intervals; the friction is the simulated one."""
+    """Parameters of the table have intervals; the friction is the simulated one."""
     friction = answer["axes"]["x"]["story"]["model"]["parameters"]["coulomb_friction.coulomb"]
     assert friction["value"] == pytest.approx(0.2, rel=0.01)
     low, high = friction["ci95"]
@@ -101,7 +101,7 @@ def test_provenance_tells_data_command_and_versions(page: str, answer: dict[str,
 
 
 def test_a_rigid_table_gets_rigid_orders_and_the_page_says_why(answer: dict[str, Any], page: str) -> None:
-    """Nobody asked for orders: the report shows an axis that is stable and physical, and says what decided."""
+    """Without given orders, the report shows a stable and physical axis, and the criterion of the choice."""
     checks = answer["axes"]["y"]["checks"]
     assert checks["stable"]["ok"] and checks["feasible"]["ok"]
     shown = len(answer["axes"]["y"]["linear"]["fits"]["ML"]["denominator"])
@@ -109,7 +109,7 @@ def test_a_rigid_table_gets_rigid_orders_and_the_page_says_why(answer: dict[str,
 
 
 def test_data_of_which_nothing_can_be_said_give_a_report_that_says_so(tmp_path: Path) -> None:
-    """Nothing moves: exit 0, a page with the reason in the summary and no story."""
+    """No motion: exit 0, a page with the reason in the summary and no story."""
     path = npz(tmp_path / "still.npz", u=lambda content: 0 * content["u"], y=lambda content: 0 * content["y"])
     said = cli("report", path, "-o", tmp_path / "still.html")
     assert said.code == 0 and "nothing can be said" in said.out
@@ -128,7 +128,7 @@ def test_a_recording_of_other_units_keeps_them(tmp_path: Path) -> None:
 
 
 def test_the_models_units_become_those_of_the_axis() -> None:
-    """Wherever V and m stand, also with a power behind them; brackets where what is below a line has more than one word."""
+    """V and m are replaced everywhere, also with powers; brackets around a denominator of more than one unit."""
     motor, joint = Units("A", "rad"), Units("N m", "rad")
     assert [motor.of(unit) for unit in ("m/s/V", "V/m", "V/m3", "1/m2", "Hz", "rad/s", "")] == [
         "rad/s/A", "A/rad", "A/rad3", "1/rad2", "Hz", "rad/s", "",
@@ -138,7 +138,7 @@ def test_the_models_units_become_those_of_the_axis() -> None:
 
 
 def test_names_from_a_file_cannot_become_markup(tmp_path: Path) -> None:
-    """An axis called like a tag is shown, not run."""
+    """An axis named like a tag is shown, not executed."""
     content = rigid(8_000)
     rows = np.column_stack((content["t"], content["u"], content["y"]))
     path = tmp_path / "bad.csv"
@@ -165,7 +165,7 @@ def test_the_answer_is_plain_json(answer: dict[str, Any]) -> None:
 @needs_browser
 @pytest.mark.parametrize(("width", "mode"), [(1400, "light"), (400, "dark")])
 def test_the_report_opens_in_a_browser_without_a_network(folder: Path, page: str, width: int, mode: str) -> None:
-    """No error, no request but for the file itself; every picture is drawn when it is reached; the page is as wide as the window."""
+    """No error, no request except the file; every figure is drawn when it becomes visible; the page is as wide as the window."""
     with browser() as made:
         context = made.new_context(viewport={"width": width, "height": 900}, color_scheme=mode, offline=True)
         tab = context.new_page()
@@ -187,12 +187,12 @@ def test_the_report_opens_in_a_browser_without_a_network(folder: Path, page: str
         tab.wait_for_function("ink => getComputedStyle(document.querySelector('#ladder-0 .xtick text')).fill != ink", arg=ink, timeout=20_000)
 
 
-PRINTED = 688  # px that both A4 and letter have between margins of 14 mm
+PRINTED = 688  # px of both A4 and letter between margins of 14 mm
 
 
 @needs_browser
 def test_every_picture_is_on_paper_and_none_is_cut(folder: Path, page: str) -> None:
-    """Before the page is printed all pictures are drawn, as wide as A4 and letter allow; headings stay with what follows; the numbers can be kept."""
+    """Before printing all figures are drawn, as wide as A4 and letter allow; headings stay with their text; the numbers can be saved."""
     with browser() as made:
         tab = made.new_context(viewport={"width": 1000, "height": 700}, offline=True).new_page()
         tab.goto((folder / "out.html").as_uri())
@@ -215,7 +215,7 @@ def test_every_picture_is_on_paper_and_none_is_cut(folder: Path, page: str) -> N
 
 
 def test_a_long_recording_is_judged_on_its_first_part(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Memory stays bounded, and the page says so."""
+    """Memory is limited, and the page says so."""
     monkeypatch.setattr("xy_sysid.report.axis_report.LONGEST", 8.0)
     path = npz(tmp_path / "long.npz", rows=12_000)
     said = cli("report", path, "-o", tmp_path / "long.html", "--json")

@@ -1,4 +1,4 @@
-"""The study's page: whole, honest, safe, and the same numbers as the fits."""
+"""The page of the study: complete, safe, and with the numbers of the fits."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def page(study: dict[str, AxisStudy]) -> str:
 
 
 def test_the_page_needs_nothing_but_itself(page: str) -> None:
-    """No source, link or import leads out of the file; it is below 8 MB and holds plotly.js once."""
+    """No external source, link or import; below 8 MB, with plotly.js once."""
     for tag, attributes in parsed(page).tags:
         assert tag not in ("link", "iframe", "base"), tag
         for name in ("src", "href", "srcset", "action"):
@@ -59,7 +59,7 @@ def test_the_page_needs_nothing_but_itself(page: str) -> None:
 
 
 def test_every_figure_and_table_has_its_heading_caption_and_label(page: str) -> None:
-    """Figures 2-7 and tables 1-2 in this order; each drawing has words for who cannot see it."""
+    """Figures 2-7 and tables 1-2 in this order; each drawing has a description for screen readers."""
     found = parsed(page)
     text = "".join(found.text)
     places = [text.index(f"Figure {k}: ") for k in range(2, 8)] + [text.index(f"Table {k}: ") for k in (1, 2)]
@@ -73,14 +73,14 @@ def test_every_figure_and_table_has_its_heading_caption_and_label(page: str) -> 
 
 
 def test_the_page_ends_with_where_it_comes_from(page: str) -> None:
-    """Provenance is the last section, notes of the reading are remarks."""
+    """Provenance is the last section, notes from reading are remarks."""
     text = "".join(parsed(page).text)
     assert text.index("Provenance") < text.index("abc123")
     assert text.index("Table 2: ") < text.index("The rate was odd.") < text.index("Provenance")
 
 
 def test_the_numbers_are_those_of_the_fits(recording: Recording, study: dict[str, AxisStudy], page: str) -> None:
-    """Table cells equal what the estimators give for the same recording."""
+    """Table cells equal the results of the estimators for the same recording."""
     frf = estimate(recording, "x", SETTINGS).frf
     ml = identify(frf, structure_from(SETTINGS))
     nlls = nllsfdi.fit(frf, structure_from(SETTINGS))
@@ -99,7 +99,7 @@ def test_the_numbers_are_those_of_the_fits(recording: Recording, study: dict[str
 
 
 def test_the_delay_in_the_model_makes_the_difference_and_the_page_says_so(study: dict[str, AxisStudy], page: str) -> None:
-    """Tens of per cent with the delay absorbed, about one or less with delay and hold; delay and pair are the machine's."""
+    """Tens of per cent with the delay absorbed, about 1 % or less with delay and hold; delay and pair are those of the machine."""
     for axis, delay, antiresonance in (("x", 1.29e-3, 46.2), ("y", 1.38e-3, 46.4)):
         fits, pair = study[axis].fits, study[axis].pair
         assert fits["LLS"].error_cost > fits["NLLS"].error_cost > 10.0 > 1.5 > fits["ML"].error_cost
@@ -113,7 +113,7 @@ def test_the_delay_in_the_model_makes_the_difference_and_the_page_says_so(study:
 
 
 def test_unstable_poles_and_poles_outside_the_band_are_named_only_where_they_are(study: dict[str, AxisStudy], page: str) -> None:
-    """The remark is there exactly when the fit has such a pole."""
+    """The remark exists if and only if the fit has such a pole."""
     text = "".join(parsed(page).text)
     for axis, one in study.items():
         for name, fit in one.fits.items():
@@ -123,7 +123,7 @@ def test_unstable_poles_and_poles_outside_the_band_are_named_only_where_they_are
 
 
 def test_a_fallen_resonance_is_seen_against_a_second_recording(recording: Recording, study: dict[str, AxisStudy]) -> None:
-    """A base that is 2 Hz lower moves antiresonance and resonance left, by an interval that holds the truth and not zero."""
+    """A base that is 2 Hz lower shifts antiresonance and resonance down, with an interval that contains the truth and not zero."""
     axes = {"x": AxisExcitation(seed=5), "y": AxisExcitation(seed=6)}
     settings = ExcitationSettings(rate=2000.0, lockstep=True, speed=0.0, axes=axes)
     loose = part(drive(Machine.from_file("loose_bolts.yaml"), settings, 75.0, lambda seconds: None), slice(2000 * 36, 2000 * 75))
@@ -137,7 +137,7 @@ def test_a_fallen_resonance_is_seen_against_a_second_recording(recording: Record
 
 
 def test_a_name_with_html_in_it_is_escaped(study: dict[str, AxisStudy]) -> None:
-    """Text that comes from files cannot become part of the page: names, notes, axes, provenance."""
+    """Text from files is escaped: names, notes, axes, provenance."""
     evil = '<img src=x onerror=alert(1)>"</script>'
     only = {evil: replace(study["x"], axis=evil)}
     made = study_page(evil, only, ("V", "m"), 0.3, {evil: {"source": evil, "notes": [evil]}}, (evil,))
@@ -152,7 +152,7 @@ def test_a_name_with_html_in_it_is_escaped(study: dict[str, AxisStudy]) -> None:
 
 
 def test_a_recording_of_one_axis_in_other_units_has_its_page(recording: Recording) -> None:
-    """rad per ampere stay so; no second axis is needed."""
+    """rad per ampere are kept; no second axis is needed."""
     u, y = recording.axis("y")
     single = replace(recording, axes=("joint",), voltage=u[:, None], position=y[:, None], input_unit="A", output_unit="rad")
     one = study_axis(single, "joint", SETTINGS)
@@ -163,7 +163,7 @@ def test_a_recording_of_one_axis_in_other_units_has_its_page(recording: Recordin
 
 
 def test_an_axis_without_excitation_is_named_and_does_not_stop_the_others(recording: Recording, study: dict[str, AxisStudy]) -> None:
-    """The page says why; the other axis is whole."""
+    """The page gives the reason; the other axis is complete."""
     still = replace(recording, voltage=recording.voltage * np.array([1.0, 0.0]))
     other = study_axis(still, "y", SETTINGS)
     assert other.problem and not other.fits and other.frf is None
@@ -174,7 +174,7 @@ def test_an_axis_without_excitation_is_named_and_does_not_stop_the_others(record
 
 
 def test_figures_hold_no_raw_signal_and_no_fixed_theme(page: str) -> None:
-    """Long signals are decimated; the template comes with the page's light or dark setting."""
+    """Long signals are decimated; the template follows the page's light or dark setting."""
     for name, plot in plots(page).items():
         assert "template" not in plot["layout"], name
         for trace in plot["data"]:
@@ -193,7 +193,7 @@ def test_a_curve_is_not_drawn_over_lines_that_are_missing() -> None:
 def test_the_command_writes_the_page_and_speaks_one_json_document(
     recording: Recording, study: dict[str, AxisStudy], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit code 0; stdout is one document with the fits' numbers; the page is there."""
+    """Exit code 0; stdout is one document with the fits' numbers; the page exists."""
     source, out = tmp_path / "table.npz", tmp_path / "study.html"
     save(recording, source)
     assert run(["study", str(source), "-o", str(out), "--axis", "x", "--json"]) == 0

@@ -1,4 +1,4 @@
-"""The head of a report, and the report on paper: title, machine, author, date, page numbers, few pages and full ones."""
+"""The head of a report, and the printed report: title, machine, author, date, page numbers, few and full pages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from xy_sysid.report.cover import Cover, cover_of, css_string
 from xy_sysid.samples.recording import Recording
 
 MOST = 12  # pages of a report on two axes
-FOOT = 0.93  # of a page's height, below which stand the page's number and the running title
+FOOT = 0.93  # fraction of a page's height, below which are the page number and the running title
 TODAY = datetime.date(2026, 5, 4)
 
 
@@ -36,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_head_names_title_machine_author_and_date(folder: Path) -> None:
-    """The machine comes from the meta data of the bag and the date from its name; the title is what was said, letter by letter."""
+    """The machine comes from the meta data of the bag and the date from its name; the title is exactly the given one."""
     found = parsed((folder / "out.html").read_text(encoding="utf-8"))
     text = " ".join(" ".join(found.text).split())
     assert 'A <b>"new"</b> screw' in text
@@ -63,7 +63,7 @@ def test_two_axes_are_printed_on_few_full_pages_with_numbers(folder: Path, paper
 
 
 def test_what_nobody_knows_is_left_out() -> None:
-    """Without meta data, clock and dated name the cover has a title and the day on which the report was written, and nothing else."""
+    """Without meta data, clock and dated name the cover has only a title and the day of the report."""
     recording = Recording.from_arrays(1000.0, [0.0] * 10, [0.0] * 10)
     cover = cover_of(recording, Cover(""), (Path("rec.csv"),), TODAY)
     assert cover == Cover("Report on rec.csv", written="2026-05-04")
@@ -71,7 +71,7 @@ def test_what_nobody_knows_is_left_out() -> None:
 
 
 def test_the_clock_of_a_recording_tells_its_date() -> None:
-    """Stamps since 1970 are a date, and what a person says goes first; a date that is none is refused in one line."""
+    """Stamps since 1970 give a date, and a given date takes precedence; an invalid date is refused in one line."""
     recording = Recording.from_arrays(1000.0, [0.0] * 10, [0.0] * 10)
     recording = dataclasses.replace(recording, time=recording.time + 1_772_548_200.0, machine="lathe")
     assert cover_of(recording, Cover(""), (), TODAY).recorded == "2026-03-03 14:30 UTC"
@@ -87,13 +87,13 @@ def test_words_at_the_foot_steer_no_style_sheet() -> None:
 
 
 def test_a_date_that_is_none_is_refused_before_the_recording_is_read(tmp_path: Path) -> None:
-    """One line says how a date is written; no page is there."""
+    """One line gives the format of a date; no page is written."""
     assert "2026-03-03" in refused("report", npz(tmp_path / "rec.npz"), "-o", tmp_path / "out.html", "--date", "soon")
     assert not (tmp_path / "out.html").exists()
 
 
 def test_a_notebook_writes_the_same_report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """``xy.write_report`` takes a recording, a run or a path, and replaces no file unasked."""
+    """``xy.write_report`` accepts a recording, a run or a path, and replaces no file without force."""
     monkeypatch.setattr("xy_sysid.report.axis_report.told", nothing_told)
     recording = xy.load(npz(tmp_path / "rec.npz", rows=4000))
     xy.write_report(recording, tmp_path / "out.html", machine="mill 7", recorded=datetime.date(2026, 3, 3))
@@ -109,7 +109,7 @@ def nothing_told(*_: object) -> None:
 
 @pytest.mark.parametrize("name", ["bag", "bag.db3"])
 def test_a_saved_bag_keeps_the_name_of_its_machine(tmp_path: Path, name: str) -> None:
-    """In its meta data, which a bare file has not; a recording without the name has none after loading."""
+    """In its meta data, which a single file lacks; a recording without the name has none after loading."""
     recording = dataclasses.replace(xy.Recording.from_arrays(100.0, [0.0, 1.0] * 50, [0.0, 0.1] * 50), machine="router 3")
     save(recording, tmp_path / name)
     assert xy.load(tmp_path / name).machine == ("router 3" if name == "bag" else "")

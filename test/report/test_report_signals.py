@@ -1,4 +1,4 @@
-"""Few points that hide nothing: what the figures of long signals are drawn from."""
+"""The reduced points of figures of long signals keep all extremes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from xy_sysid.settings import AxisExcitation
 
 
 def test_an_envelope_keeps_the_extremes_of_every_part() -> None:
-    """Single spikes survive the decimation of a million samples, at their own instants."""
+    """Single spikes survive the decimation of a million samples, at their times."""
     random = np.random.default_rng(1)
     time = np.arange(1_000_000) / 2000.0
     value = random.normal(size=time.size)
@@ -27,7 +27,7 @@ def test_an_envelope_keeps_the_extremes_of_every_part() -> None:
 
 
 def test_a_short_signal_is_drawn_as_it_is() -> None:
-    """No decimation where there is nothing to save."""
+    """No decimation of short signals."""
     time, value = np.arange(10.0), np.arange(10.0) ** 2
     t, v = envelope(time, value, 5)
     np.testing.assert_array_equal(t, time)
@@ -35,7 +35,7 @@ def test_a_short_signal_is_drawn_as_it_is() -> None:
 
 
 def test_drift_is_the_slope_of_the_whole_and_a_gap_is_not_drawn_over() -> None:
-    """1 mm/s of drift is found, and a NaN stands where samples are missing."""
+    """1 mm/s of drift is found, and missing samples are NaN."""
     seq = np.concatenate((np.arange(4000), np.arange(6000, 10_000)))
     time = seq / 1000.0
     y = (1e-3 * time + 2e-3 + 1e-4 * np.sin(40 * time))[:, None]
@@ -47,7 +47,7 @@ def test_drift_is_the_slope_of_the_whole_and_a_gap_is_not_drawn_over() -> None:
 
 
 def test_the_band_edges_of_noise_are_found_and_the_power_is_kept() -> None:
-    """White noise filtered to 300 Hz: the edge is there, and the density adds up to the variance."""
+    """White noise filtered to 300 Hz: the edge is found, and the integral of the density is the variance."""
     u = noise(AxisExcitation(low=1.0, high=300.0, rms=2.0), 2000.0).next(120_000)
     found = density(u, 2000.0)
     assert found.low == pytest.approx(1.0, rel=0.15)

@@ -1,4 +1,4 @@
-"""Pictures of a story: each shows what the document says, on both papers, for stories of any length."""
+"""Figures of a story: each shows the data of the document, in light and dark mode, for stories of any length."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ OF_A_STEP = sorted(set(story_figures.__all__) - {"ladder", "candidates", "before
 
 @cache
 def story() -> dict[str, Any]:
-    """Coulomb friction found and added; through JSON, as a browser or a file would bring it."""
+    """Coulomb friction found and added; converted through JSON, as for a browser or a file."""
     made: dict[str, Any] = json.loads(json.dumps(document(told())))
     return made
 
 
 @cache
 def silent() -> dict[str, Any]:
-    """Data in which nothing moves."""
+    """Data without motion."""
     made: dict[str, Any] = json.loads(json.dumps(document(begin(Run("x", 2000.0, np.zeros(20_000), np.zeros(20_000))))))
     return made
 
@@ -47,7 +47,7 @@ def curve(figure: go.Figure, name: str) -> np.ndarray:
 @pytest.mark.parametrize("mode", ["light", "dark"])
 @pytest.mark.parametrize("name", story_figures.__all__)
 def test_every_picture_is_drawn_on_both_papers(name: str, mode: str) -> None:
-    """At least one curve with numbers in it, in the ink of the paper, with little margin."""
+    """At least one curve with numbers, in the text colour of the mode, with narrow margins."""
     figure = getattr(story_figures, name)(story(), mode=mode)
     drawn = [np.asarray(item.x if item.type == "bar" else item.y, dtype=float) for item in figure.data]
     assert drawn and max(np.isfinite(values).sum() for values in drawn) >= 2
@@ -58,7 +58,7 @@ def test_every_picture_is_drawn_on_both_papers(name: str, mode: str) -> None:
 
 @pytest.mark.parametrize("name", story_figures.__all__)
 def test_a_story_without_data_gives_its_sentence(name: str) -> None:
-    """No step, no curve: the reason stands where the picture would be."""
+    """Without a step there is no curve, but the reason."""
     figure = getattr(story_figures, name)(silent())
     assert not figure.data
     assert "does not move" in words_in(figure).replace("<br>", " ")
@@ -66,7 +66,7 @@ def test_a_story_without_data_gives_its_sentence(name: str) -> None:
 
 @pytest.mark.parametrize("name", OF_A_STEP)
 def test_a_step_without_pictures_shows_the_one_before_it(name: str) -> None:
-    """Old steps of long stories carry no pictures."""
+    """Old steps of long stories have no figure data."""
     long = copy.deepcopy(story())
     long["steps"][-1]["pictures"] = None
     shown = getattr(story_figures, name)(long)
@@ -74,7 +74,7 @@ def test_a_step_without_pictures_shows_the_one_before_it(name: str) -> None:
 
 
 def test_the_ladder_falls_to_the_floor() -> None:
-    """The staircase has the numbers of the document in mm/s; the last step carries the mark of the floor."""
+    """The staircase has the numbers of the document in mm/s; the last step has the mark of the floor."""
     figure = story_figures.ladder(story())
     rungs = story()["ladder"]
     held = curve(figure, "held-out error")
@@ -86,7 +86,7 @@ def test_the_ladder_falls_to_the_floor() -> None:
 
 
 def test_no_label_of_a_step_is_wider_than_its_step() -> None:
-    """A label that runs over the edge is not drawn at all, so long ones take several lines."""
+    """A label beyond the edge is not drawn, so long ones are wrapped."""
     changed = copy.deepcopy(story())
     changed["ladder"][-1]["label"] = "with backlash (error one sample ahead)"
     lines = [line for text in story_figures.ladder(changed).layout.xaxis.ticktext for line in text.split("<br>")]
@@ -95,7 +95,7 @@ def test_no_label_of_a_step_is_wider_than_its_step() -> None:
 
 
 def test_failing_bands_are_shaded_and_named() -> None:
-    """The base fails over a band of frequency: its shade lies there, its words give the size; the last step has no shade."""
+    """The base fails in a band of frequency: it is shaded, with its size in words; the last step has no shade."""
     figure = story_figures.residual(story(), 0)
     place = next(item for item in story()["steps"][0]["pictures"]["failing"] if item["kind"] == "frequency" and item["to"] > 1.0)
     shades = [item for item in figure.layout.shapes if item.type == "rect"]
@@ -105,7 +105,7 @@ def test_failing_bands_are_shaded_and_named() -> None:
 
 
 def test_friction_shows_as_a_jump_at_standstill() -> None:
-    """Mean error against velocity has opposite signs on the two sides of zero in the base, and none is left in the end."""
+    """The mean error by velocity has opposite signs on both sides of zero for the base, and vanishes for the last step."""
     speed = np.array(story()["steps"][0]["pictures"]["residual"]["speed"]["speed"])
     slow = (np.abs(speed) < 0.02) & (np.abs(speed) > 0.004)
     base = curve(story_figures.residual_speed(story(), 0), "mean error (mm/s)")
@@ -115,7 +115,7 @@ def test_friction_shows_as_a_jump_at_standstill() -> None:
 
 
 def test_lines_that_are_not_trusted_are_grey_and_leave_the_curve() -> None:
-    """Above the excited band there is no curve and no band, only grey crosses."""
+    """Above the excited frequencies there is no curve and no uncertainty band, only grey crosses."""
     figure = story_figures.bode(story())
     trusted = np.array(story()["measured"]["frequency_response"]["trusted"])
     crosses = next(item for item in figure.data if item.name == "not trusted")
@@ -134,7 +134,7 @@ def test_the_measured_response_is_in_millimetres() -> None:
 
 
 def test_candidates_are_ranked_by_what_they_leave() -> None:
-    """Bars rise from top to bottom, the named one says so, and each tells its evidence; figures of short bars stand beside them."""
+    """Bars increase from top to bottom, the named one is marked, and each shows its evidence; numbers of short bars are next to them."""
     bars = story_figures.candidates(story()).data[0]
     rounded = [float(f"{value:.2g}") for value in bars.x]
     assert rounded == sorted(rounded)
@@ -144,14 +144,14 @@ def test_candidates_are_ranked_by_what_they_leave() -> None:
 
 
 def test_before_and_after_lie_over_each_other() -> None:
-    """Two steps in one picture: the later one lower at every frequency where the first one fails."""
+    """Two steps in one figure: the later one is lower at every frequency where the first fails."""
     figure = story_figures.before_after(story(), 0, -1)
     before, after = (curve(figure, name) for name in ("before: rigid, with delay", "after: with coulomb friction"))
     assert np.all(after[before > 3.0] < before[before > 3.0])
 
 
 def test_an_unstable_pole_is_shown_as_such() -> None:
-    """The right half is shaded when a pole lies there."""
+    """The right half plane is shaded if it contains a pole."""
     bad = copy.deepcopy(story())
     bad["steps"][-1]["pictures"]["linear"]["poles"].append({"real": 40.0, "imag": 300.0, "frequency": 48.0, "damping": -0.13})
     figure = story_figures.poles_zeros(bad)

@@ -1,4 +1,4 @@
-"""Colours that everybody can tell apart, on white and on near-black paper; and one convention for units on axes."""
+"""Colours that all users can distinguish, on white and on near-black; and one convention for units on axes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SEES = {
     "no green": np.array([[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]),
     "no blue": np.array([[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]]),
 }
-APART, READABLE = 18.0, 2.8  # CIE76 difference; WCAG contrast (3 is asked of graphics that carry meaning alone; ours have a dash or marker, too)
+APART, READABLE = 18.0, 2.8  # CIE76 difference; WCAG contrast (3 is required for graphics without other cues; ours also have a dash or marker)
 PAPERS = ("#ffffff", "#161b22")
 GROUPS = {
     "story": (theme.MEASURED, theme.MODEL, theme.FLOOR, theme.FAILS, theme.UNTRUSTED),
@@ -51,7 +51,7 @@ def contrast(first: str, second: str) -> float:
 @pytest.mark.parametrize("who", SEES)
 @pytest.mark.parametrize("group", GROUPS)
 def test_colours_of_a_figure_are_told_apart_by_everybody(group: str, who: str) -> None:
-    """Whoever sees no red, no green or no blue sees as many curves as everybody."""
+    """The curves are distinguishable without red, green or blue vision."""
     for first, second in itertools.combinations(GROUPS[group], 2):
         apart = np.linalg.norm(lab(SEES[who] @ linear(first)) - lab(SEES[who] @ linear(second)))
         assert apart > APART, (first, second, float(apart))
@@ -59,7 +59,7 @@ def test_colours_of_a_figure_are_told_apart_by_everybody(group: str, who: str) -
 
 @pytest.mark.parametrize("paper", PAPERS)
 def test_curves_are_readable_on_light_and_on_dark_paper(paper: str) -> None:
-    """The same colours stand on both."""
+    """The same colours are readable on both."""
     for colour in itertools.chain(*GROUPS.values()):
         assert contrast(colour, paper) > READABLE, (colour, contrast(colour, paper))
 

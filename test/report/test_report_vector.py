@@ -1,4 +1,4 @@
-"""Figures as vectors without a browser: every picture of a story as SVG and PDF, with its words and curves in it."""
+"""Figures as vectors without a browser: every figure of a story as SVG and PDF, with its text and curves."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def paths(svg: bytes) -> int:
 
 
 def test_every_picture_of_a_story_becomes_vectors() -> None:
-    """All of the gallery, not empty, not a bitmap, and the same bytes each time."""
+    """The full gallery: not empty, no bitmap, and the same bytes each time."""
     figures = gallery(document(told()))
     assert {"error_ladder", "frequency_response", "candidate_effects", "rigid_model_fails_by_speed", "last_model_fails_by_frequency"} <= set(figures)
     for name, figure in figures.items():
@@ -36,7 +36,7 @@ def test_every_picture_of_a_story_becomes_vectors() -> None:
 
 @pytest.mark.parametrize(("columns", "width"), [(1, 88.0), (2, 181.0)])
 def test_a_figure_is_as_wide_as_the_columns_of_a_journal_and_clips_nothing(columns: int, width: float) -> None:
-    """88 and 181 mm, and every word, from the name of an effect to the runner-up's error, lies on the paper."""
+    """88 and 181 mm, and every word, from the name of an effect to the runner-up's error, is on the page."""
     for name, figure in gallery(document(told())).items():
         size, words = words_on(figure, columns)
         assert size[0] == pytest.approx(width / 25.4), name
@@ -46,7 +46,7 @@ def test_a_figure_is_as_wide_as_the_columns_of_a_journal_and_clips_nothing(colum
 
 
 def words_on(figure: go.Figure, columns: int) -> tuple[tuple[float, float], dict[str, Any]]:
-    """(width, height) in inches and the box of all that is written in dots of 1/100 inch."""
+    """(width, height) in inches and the bounding box of all text in dots of 1/100 inch."""
     from xy_sysid.report.vector import drawn
 
     paper = drawn(figure, columns)
@@ -69,7 +69,7 @@ def test_upright_bars_stand_where_their_numbers_say() -> None:
 
 
 def test_legends_and_tables_name_the_axis_and_all_effects_of_the_model() -> None:
-    """With two effects in the model, every picture that shows it names both; its table has the axis and both effects as names of columns."""
+    """With two effects in the model, every figure of it names both; its table has the axis and both effects in the column names."""
     story: Any = document(told())
     for step in story["steps"][1:]:
         step["effects"] = ["coulomb_friction", "cogging"]
@@ -84,7 +84,7 @@ def test_legends_and_tables_name_the_axis_and_all_effects_of_the_model() -> None
 
 
 def test_a_curve_lies_where_its_numbers_say() -> None:
-    """On logarithmic axes, too: a straight line between two decades passes the middle of the picture."""
+    """Also on logarithmic axes: a straight line between two decades passes the middle of the figure."""
     figure = go.Figure(go.Scatter(x=[1.0, 100.0], y=[1.0, 100.0], mode="lines", line={"color": "#123456"}))
     figure.update_xaxes(type="log", range=[0, 2])
     figure.update_yaxes(type="log", range=[0, 2])
@@ -95,14 +95,14 @@ def test_a_curve_lies_where_its_numbers_say() -> None:
 
 
 def test_without_matplotlib_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One line with the extra's name."""
+    """One line with the name of the extra."""
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingExtra, match=r"xy_sysid\[figures\]"):
         vectors(go.Figure(), ["svg"])
 
 
 def test_figures_writes_them_into_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One file for each picture and kind, named by axis and picture; the table's numbers are those drawn; a wrong kind is refused."""
+    """One file for each figure and kind, named by axis and figure; the table has the drawn numbers; a wrong kind is refused."""
     rec = tmp_path / "dry.npz"
     assert cli("simulate", rec, "--machine", "rigid.yaml", "--duration", "4").code == 0
     assert "svg, pdf, csv" in refused("figures", rec, "-o", tmp_path / "out", "--kind", "gif") and not (tmp_path / "out").exists()

@@ -1,4 +1,4 @@
-"""Numbers as people read them."""
+"""Numbers for readers."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from xy_sysid.units import readable
     [(-1.5, 3, "−1.5"), (293.4, 2, "290"), (4468611.0, 6, "4.46861·10⁶"), (3.2e-7, 2, "3.2·10⁻⁷"), (float("nan"), 3, "–"), (0.0, 3, "0")],
 )
 def test_a_number_has_a_true_minus_and_powers_of_ten_only_where_needed(value: float, digits: int, text: str) -> None:
-    """No 1e+06 on a page for people."""
+    """No 1e+06 on a page."""
     assert number(value, digits) == text
 
 
 def test_an_interval_keeps_its_zeros_and_shows_two_digits_of_its_half_width() -> None:
-    """46.4070, not 46.407, beside 46.3928; milliseconds for seconds."""
+    """46.4070, not 46.407, next to 46.3928; milliseconds for seconds."""
     assert estimate_text(Interval("r", 46.3999, 0.0036, 46.3928, 46.4070, "Hz")) == "46.3999 [46.3928, 46.4070] Hz"
     assert estimate_text(Interval("delay", 1.29e-3, 1e-6, 1.28e-3, 1.30e-3, "s")) == "1.290 [1.280, 1.300] ms"
     assert estimate_text(Interval("a", 2.5e7, 1e4, 2.498e7, 2.502e7, "")) == "2.5000 [2.4980, 2.5020]·10⁷"
 
 
 def test_lengths_are_read_in_mm_and_other_units_stay() -> None:
-    """People read mm; rad stay rad."""
+    """m are shown as mm; rad are unchanged."""
     assert readable("m/s/V") == (1e3, "mm/s/V")
     assert quantity(0.0097, "m") == "9.7 mm"
     assert quantity(1.5, "rad") == "1.5 rad"

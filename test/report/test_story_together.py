@@ -1,4 +1,4 @@
-"""Several recordings and models in one picture."""
+"""Several recordings and models in one figure."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def story() -> dict[str, Any]:
 
 
 def turned() -> dict[str, Any]:
-    """The same machine, its phase told one turn lower and its gain twice."""
+    """The same machine, with the phase lower by one turn and twice the gain."""
     made = copy.deepcopy(story())
     response = made["measured"]["frequency_response"]
     for name in ("phase_deg", "phase_low_deg", "phase_high_deg"):
@@ -54,7 +54,7 @@ def test_each_axis_has_a_colour_and_each_model_a_dash_of_it() -> None:
 
 
 def test_phases_that_are_whole_turns_apart_lie_on_each_other() -> None:
-    """A phase is known to whole turns only; levels are what they are."""
+    """Phases are shifted by whole turns; levels are unchanged."""
     figure = together([Entry("a", story()), Entry("b", turned())])
     (level, phase), (higher, same) = rows_of(figure, "a"), rows_of(figure, "b")
     assert np.nanmax(np.abs(phase - same)) < 1e-9
@@ -67,6 +67,6 @@ def test_nothing_chosen_says_what_to_do() -> None:
 
 
 def test_a_name_from_a_file_is_no_markup() -> None:
-    """What stands in a file's name is text."""
+    """The name of a file is shown as text."""
     figure = together([Entry("<b>x</b>", story())])
     assert all("<b>" not in str(item.name) for item in figure.data)

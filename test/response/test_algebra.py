@@ -29,7 +29,7 @@ def test_a_sum_and_a_difference_carry_both_errors() -> None:
 
 
 def test_a_product_is_one_after_the_other() -> None:
-    """Units follow: m per V after V per A is m per A; the other way round is refused."""
+    """Units are combined: m per V after V per A is m per A; the reverse order is refused."""
     plant, drive = measured(2.0, 0.01), measured(3.0, 0.02, ("A", "V"))
     both = plant * drive
     assert (both.input_unit, both.output_unit) == ("A", "m")
@@ -62,7 +62,7 @@ def test_an_inverse_undoes() -> None:
 
 
 def test_other_lines_are_brought_to_the_first_ones() -> None:
-    """Within the band that both have; without one it is refused."""
+    """Within the common band; without one it is refused."""
     one, other = measured(2.0, 0.01), measured(1.0, 0.01, lines=slice(10, 60, 2))
     both = one + other
     assert (both.frequency[0], both.frequency[-1]) == (F[10], F[58])
@@ -72,6 +72,6 @@ def test_other_lines_are_brought_to_the_first_ones() -> None:
 
 
 def test_several_responses_are_drawn_together() -> None:
-    """bode takes responses and models in any number."""
+    """bode accepts any number of responses and models."""
     figure = xy.plot.bode(measured(2.0, 0.01), measured(1.0, 0.01))
     assert len({trace.name for trace in figure.data if trace.name and "band" not in trace.name}) == 2

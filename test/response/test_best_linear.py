@@ -1,4 +1,4 @@
-"""Several realisations of a periodic input tell noise from nonlinear distortion."""
+"""Several realisations of a periodic input distinguish noise from nonlinear distortion."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PERIOD, PERIODS, RATE, NOISE, BEND = 512, 6, 500.0, 2e-3, 0.3
 
 
 def realisations(count: int, bend: float, noise: float = NOISE) -> Recording:
-    """A filter behind a cubic law, with noise, driven by multisines of other phases, one after the other with gaps."""
+    """A filter behind a cubic law, with noise, driven by multisines of different phases, in sequence with gaps."""
     random, parts = np.random.default_rng(8), []
     for _ in range(count):
         phases = np.exp(2j * np.pi * random.uniform(size=PERIOD // 4))
@@ -31,7 +31,7 @@ def realisations(count: int, bend: float, noise: float = NOISE) -> Recording:
 
 
 def test_noise_and_distortion_are_told_apart() -> None:
-    """The noise of the response is that of the sensor by the periods; the distortion is far above it, and sigma is of the larger."""
+    """The noise of the response, from the periods, is that of the sensor; the distortion is far above it, and sigma is the larger of the two."""
     found = xy.frf(realisations(8, BEND), band_high=100.0, differenced=False)
     lines = found.select(found.trusted)
     assert len(lines) > 80
@@ -43,7 +43,7 @@ def test_noise_and_distortion_are_told_apart() -> None:
 
 
 def test_a_linear_machine_shows_no_distortion() -> None:
-    """What differs between realisations is then noise alone."""
+    """The differences between realisations are then noise only."""
     found = xy.frf(realisations(8, 0.0), band_high=100.0, differenced=False)
     lines = found.select(found.trusted)
     assert float(np.sqrt(np.mean(lines.distortion**2) / np.mean(lines.noise**2))) < 1.0

@@ -1,4 +1,4 @@
-"""Identification while a controller stays in charge: the reference as instrument, where output over input is biased by feedback."""
+"""Identification in closed loop: the reference as instrument, because feedback biases output over input."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def recordings(request: pytest.FixtureRequest) -> list[Recording]:
 
 
 def test_the_reference_as_instrument_is_right_where_output_over_input_is_not(recordings: list[Recording]) -> None:
-    """On a simulated servo plain H1 is wrong by more than 10 %; joint input-output agrees with the truth within its sigma."""
+    """On a simulated servo H1 is wrong by more than 10 %; joint input-output agrees with the truth within its sigma."""
     plain = estimate(recordings[0], "x", H1).frf
     true = SERVO.response(plain.frequency)[plain.trusted]
     assert abs(np.mean(plain.response[plain.trusted] / true) - 1.0) > 0.1
@@ -52,7 +52,7 @@ def test_the_reference_as_instrument_is_right_where_output_over_input_is_not(rec
 
 
 def test_the_intervals_of_the_fit_hold_the_truth_in_closed_loop(recordings: list[Recording]) -> None:
-    """95 % intervals of inertia and drag: nearly all hold the truth; those of plain H1 never do."""
+    """95 % intervals of inertia and drag: nearly all contain the truth; those of H1 never do."""
     held: list[bool] = []
     biased: list[bool] = []
     for recording in recordings:
@@ -67,7 +67,7 @@ def test_the_intervals_of_the_fit_hold_the_truth_in_closed_loop(recordings: list
 
 
 def test_a_recording_without_a_moving_reference_is_refused() -> None:
-    """response joint_input_output without a reference, or with one that stands still: one sentence with what to do."""
+    """response joint_input_output without a reference, or with a constant one: one sentence with the next action."""
     recording = SERVO.run(REFERENCES["noise"][:5000])
     for reference, words in ((None, "has no reference"), (np.zeros((5000, 1)), "reference of axis x")):
         changed = Recording(
@@ -84,7 +84,7 @@ def test_a_recording_without_a_moving_reference_is_refused() -> None:
 
 
 def test_frf_and_fit_take_the_reference_of_a_file(tmp_path: Path) -> None:
-    """A CSV with x_reference: frf and fit identify in closed loop when told, and say that they do; without, they say that H1 is biased."""
+    """A CSV with x_reference: frf and fit identify in closed loop if requested, with a note; otherwise a note says that H1 is biased."""
     path = tmp_path / "servo.csv"
     save(SERVO.run(REFERENCES["multisine"]), path)
     told = [

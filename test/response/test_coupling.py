@@ -23,7 +23,7 @@ RATE, SHAPE, BAND = 500.0, WindowShape.of("hann", 512, 0.5), (2.0, 100.0)
 
 
 def machine(cross: float, mix: FloatArray | None = None, seconds: float = 120.0, alike: bool = False) -> Recording:
-    """Two axes with lags of their own, each moved a little by the other's drive; mix: drives and encoders are sums and differences."""
+    """Two axes with different lags, each moved a little by the other's drive; mix: drives and encoders are sums and differences."""
     random = np.random.default_rng(6)
     u = random.normal(size=(int(seconds * RATE), 2))
     if alike:
@@ -42,7 +42,7 @@ def of(recording: Recording, combine: str = "") -> Coupling:
 
 
 def test_axes_that_are_not_coupled_get_a_limit() -> None:
-    """In per cent and decibels, with the band, and the verdict that two single-axis models suffice."""
+    """In per cent and dB, with the band, and the verdict that two single-axis models suffice."""
     found = of(machine(0.0))
     assert found.suffice
     assert "two single-axis models suffice" in found.sentence and "dB" in found.sentence
@@ -50,7 +50,7 @@ def test_axes_that_are_not_coupled_get_a_limit() -> None:
 
 @pytest.mark.parametrize("cross", [0.03, 0.2])
 def test_axes_that_are_coupled_are_said_to_be(cross: float) -> None:
-    """With the size of the coupling and where it is; the cross responses are right within their sigma."""
+    """With size and band of the coupling; the cross responses are right within their sigma."""
     found = of(machine(cross))
     assert not found.suffice and "do not suffice" in found.sentence
     assert float(np.median(found.coupling)) == pytest.approx(cross, rel=0.5)
@@ -59,13 +59,13 @@ def test_axes_that_are_coupled_are_said_to_be(cross: float) -> None:
 
 
 def noisy(seconds: float) -> Recording:
-    """Two axes that are not coupled, with noise in their encoders."""
+    """Two uncoupled axes with encoder noise."""
     quiet = machine(0.0, seconds=seconds)
     return Recording.from_arrays(RATE, quiet.voltage, quiet.position + 2e-4 * np.random.default_rng(1).normal(size=quiet.position.shape))
 
 
 def test_too_little_data_rule_nothing_out_and_how_long_a_recording_would_is_said() -> None:
-    """Neither suffice nor coupled: in which band too few windows exclude it, up to how much it may be there, and the time that would do."""
+    """Undecided: the band with too few windows, the upper limit of the coupling there, and the required time."""
     found = of(noisy(6.0))
     assert not found.suffice and not found.coupled
     assert f"too few windows ({found.windows})" in found.sentence and "may be up to" in found.sentence
@@ -73,20 +73,20 @@ def test_too_little_data_rule_nothing_out_and_how_long_a_recording_would_is_said
 
 
 def test_the_sentence_of_a_few_windows_has_no_exponents() -> None:
-    """Where noise is larger than the own motion the size is any, and hours are whole numbers."""
+    """If noise exceeds the axis's own motion, the size is unlimited, and hours are whole numbers."""
     found = replace(of(noisy(6.0)), at_most=np.full(1, 1.4), coupling=np.zeros(1), band_edges=np.array([1.0, 1.3]), needed=468_000.0)
     assert "there it may be of any size" in found.sentence and "about 130 h" in found.sentence
 
 
 def test_the_time_that_is_said_to_suffice_does_not_depend_on_the_recording() -> None:
-    """The limit falls with the root of the time: from 30 s and from 240 s follows the same time, within what noise allows."""
+    """The limit falls with the root of the time: 30 s and 240 s give the same required time, within the noise."""
     short, long = of(noisy(30.0)), of(noisy(240.0))
     assert long.largest < 0.6 * short.largest
     assert 0.4 < long.needed / short.needed < 2.5
 
 
 def test_the_two_motors_of_a_corexy_are_taken_apart() -> None:
-    """Motor by motor all is coupled; as x and y nothing is."""
+    """By motors both are coupled; as x and y they are not."""
     recording = machine(0.0, mix=np.array([[1.0, 1.0], [1.0, -1.0]]))
     assert not of(recording).suffice
     found = of(recording, "corexy")
@@ -94,13 +94,13 @@ def test_the_two_motors_of_a_corexy_are_taken_apart() -> None:
 
 
 def test_inputs_that_are_alike_are_refused() -> None:
-    """One signal on both axes tells no cross response."""
+    """With one signal on both axes the cross responses are unknown."""
     with pytest.raises(BadInput, match="alike"):
         of(machine(0.0, alike=True))
 
 
 def multisine(seed: int, rows: int, period: int = 4096) -> FloatArray:
-    """All lines to 300 Hz at 1 kHz, with phases of their own, again and again."""
+    """All lines to 300 Hz at 1 kHz, with random phases, repeated."""
     spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
     spectrum[1:1228] = np.exp(2j * np.pi * np.random.default_rng(seed).random(1227))
     one: FloatArray = np.fft.irfft(spectrum)
@@ -116,7 +116,7 @@ def driven(u: FloatArray, cross: float) -> FloatArray:
 @pytest.mark.parametrize("negated", [False, True])
 @pytest.mark.parametrize("cross", [0.0, 0.05])
 def test_two_multisines_tell_the_coupling(cross: float, negated: bool) -> None:
-    """One realisation, in windows shorter than its period; or a second one in which one axis is negated: orthogonal multisines."""
+    """One realisation, in windows shorter than its period; or a second one with one axis negated: orthogonal multisines."""
     rows = 60_000
     u = np.column_stack((multisine(1, rows), multisine(2, rows)))
     parts = [u, u * (1.0, -1.0)] if negated else [u]

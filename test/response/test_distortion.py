@@ -1,4 +1,4 @@
-"""Even and odd distortion of an axis, read where an odd multisine leaves lines free."""
+"""Even and odd distortion of an axis, at the free lines of an odd multisine."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def split(effect: str, kind: str = "multisine_detect") -> Distortion | None:
 
 
 def test_a_linear_axis_shows_none() -> None:
-    """Neither kind rises above what does not repeat."""
+    """Neither kind exceeds the non-periodic part."""
     found = split("")
     assert found is not None and found.odd is not None
     assert not found.even.seen and not found.odd.seen
@@ -34,7 +34,7 @@ def test_a_linear_axis_shows_none() -> None:
 
 @pytest.mark.parametrize("effect", ["coulomb_friction", "dead_zone", "saturation"])
 def test_what_is_alike_in_both_directions_is_odd(effect: str) -> None:
-    """Far above noise, and above what is even."""
+    """Far above noise, and above the even part."""
     found = split(effect)
     assert found is not None and found.odd is not None
     assert found.odd.seen and found.odd.level > -35.0
@@ -42,13 +42,13 @@ def test_what_is_alike_in_both_directions_is_odd(effect: str) -> None:
 
 
 def test_what_differs_between_the_directions_is_even_too() -> None:
-    """Uneven friction."""
+    """Asymmetric friction."""
     found = split("asymmetric_friction")
     assert found is not None and found.even.seen and found.even.level > -55.0
 
 
 def test_what_the_multisine_cannot_show_is_not_told() -> None:
-    """Odd without detection lines: even only; full: nothing at all."""
+    """Odd without detection lines: even distortion only; full: none."""
     odd = split("coulomb_friction", "multisine_odd")
     assert odd is not None and odd.odd is None and "multisine_detect" in odd.sentence
     assert split("coulomb_friction", "multisine") is None

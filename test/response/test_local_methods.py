@@ -29,7 +29,7 @@ def estimated(method: str, seed: int = 1) -> tuple[FrequencyResponse, float, flo
 
 
 def test_a_short_record_with_a_sharp_resonance_has_less_error() -> None:
-    """Behind an integrator, too: a third of H1's for the polynomial's lines, a fifth for the rational ones; sigma tells the error that there is."""
+    """Also behind an integrator: a third of H1's error for the polynomial, a fifth for the rational method; sigma agrees with the error."""
     (_, plain, _), (_, polynomial, _), (found, rational, ratio) = (estimated(name) for name in ("h1", "local_polynomial", "local_rational"))
     assert polynomial < 0.7 * plain and rational < 0.2 * plain
     assert 0.8 < ratio < 1.4
@@ -38,7 +38,7 @@ def test_a_short_record_with_a_sharp_resonance_has_less_error() -> None:
 
 
 def test_a_transfer_function_is_fitted_to_it() -> None:
-    """Neighbouring lines share data, and the fit knows it: the cost is what noise explains; the resonance is off by less than 0.1 mHz."""
+    """The fit accounts for correlated lines: noise explains the cost; the resonance has an error below 0.1 mHz."""
     model = xy.fit(estimated("local_rational")[0].band(20.0, 120.0), numerator_order=2, denominator_order=4)
     assert model.fit is not None and model.fit.cost == pytest.approx(model.fit.expected_cost, rel=0.3)
     assert min(abs(mode.frequency - RESONANCE) for mode in model.tf.pole_modes()) < 1e-4
@@ -46,7 +46,7 @@ def test_a_transfer_function_is_fitted_to_it() -> None:
 
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_adds_windows_one_by_one_as_it_does_whole_records(name: str) -> None:
-    """Online and from a file: the same sums, and the same response of them after a restart."""
+    """Online and from a file: the same sums, and the same response after a restart."""
     method, length = METHODS[name], 256
     shape, random = method.shape("hann", length, 0.5), np.random.default_rng(5)
     u, y, r = random.normal(size=(3, 4 * length + 1))

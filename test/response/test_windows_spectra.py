@@ -1,4 +1,4 @@
-"""The river from samples to the frequency response."""
+"""The steps from samples to the frequency response."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def run(u: np.ndarray, y: np.ndarray, shape: WindowShape, *, differenced: bool, 
 
 
 def full_buffer(u: np.ndarray, y: np.ndarray, shape: WindowShape, *, differenced: bool, weights: np.ndarray | None = None) -> Spectra:
-    """The same sums, written down directly from the definition."""
+    """The same sums, directly from the definition."""
     taper = signal.get_window(shape.name, shape.length)
     out = np.diff(y) if differenced else y
     starts = range(0, len(out) - shape.length + 1, shape.hop)
@@ -66,7 +66,7 @@ def test_the_plain_variant_agrees_with_scipy_on_the_same_windows(name: str) -> N
 
 
 def test_every_taper_of_the_settings_is_scipys_bit_for_bit() -> None:
-    """Odd lengths and even ones; and a name that is none is refused with those that there are."""
+    """Odd and even lengths; an unknown name is refused with the existing ones."""
     assert set(COSINES) == set(get_args(IdentifierSettings.model_fields["window"].annotation))
     for name in COSINES:
         for length in (16, 255, 1000, 4096):
@@ -77,7 +77,7 @@ def test_every_taper_of_the_settings_is_scipys_bit_for_bit() -> None:
 
 @pytest.mark.parametrize("differenced", [False, True])
 def test_incremental_and_full_buffer_agree_to_1e_12(differenced: bool) -> None:
-    """Adding windows one by one gives what the whole buffer gives."""
+    """Adding windows one by one equals the full buffer."""
     u, y = noise(50_000, 3)
     shape = WindowShape.of("hann", 2048, 0.75)
     ours, full = run(u, y, shape, differenced=differenced).get(), full_buffer(u, y, shape, differenced=differenced)
@@ -94,11 +94,11 @@ def test_forgetting_weighs_windows_by_their_age() -> None:
     number = len(range(0, 30_000 - 1023, shape.hop))
     full = full_buffer(u, y, shape, differenced=False, weights=0.9 ** np.arange(number - 1, -1, -1))
     assert np.max(np.abs(ours.gyx - full.gyx)) < 1e-12 * np.max(np.abs(full.gyx))
-    assert ours.averages == pytest.approx(19 / (1 + 2 / 36), rel=0.01)  # (1 + forget) / (1 - forget), less the overlap's share
+    assert ours.averages == pytest.approx(19 / (1 + 2 / 36), rel=0.01)  # (1 + forget) / (1 - forget), minus the effect of the overlap
 
 
 def test_sliding_keeps_only_the_newest_windows() -> None:
-    """Dropping the oldest window leaves no trace of it."""
+    """Dropping the oldest window removes its influence completely."""
     u, y = noise(30_000, 5)
     shape = WindowShape.of("hann", 1024, 0.5)
     ours = run(u, y, shape, differenced=False, sliding=6).get()
@@ -110,14 +110,14 @@ def test_sliding_keeps_only_the_newest_windows() -> None:
 
 @pytest.mark.parametrize("chunk", [1, 20, 4096, 30_000])
 def test_any_chunking_gives_the_same_bits(chunk: int) -> None:
-    """Windows, not chunks, are what gets processed."""
+    """The result depends on windows, not on chunks."""
     u, y = noise(30_000, 6)
     shape = WindowShape.of("hann", 4096, 0.5)
     assert np.array_equal(run(u, y, shape, differenced=True, chunk=chunk).get().gyx, run(u, y, shape, differenced=True, chunk=777).get().gyx)
 
 
 def test_a_late_observer_sees_the_same_windows() -> None:
-    """Windows lie on a grid of the counter, so that missing the first samples shifts nothing."""
+    """Windows lie on a grid of the counter, so that missing first samples shift nothing."""
     shape = WindowShape.of("hann", 64, 0.5)
     values = np.random.default_rng(1).standard_normal((500, 1))
     whole = Windower(shape, 1, 1).feed(Samples(0, values, values))
@@ -138,7 +138,7 @@ def test_no_window_reaches_across_a_gap() -> None:
 
 
 def test_the_differenced_estimate_has_no_integrator_leakage() -> None:
-    """On an integrator the differenced estimate is at least ten times nearer to the truth than the plain one, at low frequency."""
+    """For an integrator the error of the differenced estimate is at least ten times smaller at low frequency."""
     random = np.random.default_rng(2)
     u = signal.sosfilt(signal.butter(4, [0.5, 300], "bandpass", fs=FS, output="sos"), random.standard_normal(240_000))
     pole = np.exp(-246.0 / FS)
@@ -173,7 +173,7 @@ def test_sigma_tells_the_true_scatter() -> None:
 
 
 def test_the_blur_kernel_predicts_the_bias_at_a_sharp_resonance() -> None:
-    """The expected estimate is the response seen through the window; without the kernel the error is many times larger."""
+    """The expected estimate is the response smoothed by the window; without the kernel the error is many times larger."""
     fs, f0, zeta = 1000.0, 50.0, 0.01
     b, a = signal.bilinear([1.0], [1 / (2 * np.pi * f0) ** 2, 2 * zeta / (2 * np.pi * f0), 1.0], fs)
     u = np.random.default_rng(8).standard_normal(1_000_000)
@@ -208,7 +208,7 @@ def test_hann_constants_are_the_textbook_ones() -> None:
 
 
 def test_too_few_windows_are_not_trusted() -> None:
-    """One window has coherence 1 and means nothing."""
+    """One window has coherence 1, which is meaningless."""
     u, y = noise(4096)
     shape = WindowShape.of("hann", 4096, 0.5)
     frf = frequency_response(run(u, y, shape, differenced=False).get(), shape, FS, H1Options(differenced=False))
@@ -234,13 +234,13 @@ def test_a_state_goes_on_where_it_stopped() -> None:
 
 
 def test_an_impossible_overlap_is_refused() -> None:
-    """The error names the value and what is allowed."""
+    """The error gives the value and the allowed range."""
     with pytest.raises(BadInput, match=r"overlap is 0\.999"):
         WindowShape.of("hann", 16, 0.999)
 
 
 def test_a_window_holds_its_own_copy() -> None:
-    """Later samples do not change a window that was given out."""
+    """Later samples do not change a returned window."""
     windower = Windower(WindowShape.of("hann", 16, 0.5), 1, 0)
     window: Window = windower.feed(Samples(0, np.arange(16.0)[:, None], np.zeros((16, 1))))[0]
     windower.feed(Samples(16, np.full((100, 1), -1.0), np.zeros((100, 1))))
@@ -249,7 +249,7 @@ def test_a_window_holds_its_own_copy() -> None:
 
 @pytest.mark.parametrize("differenced", [False, True])
 def test_the_batch_agrees_with_the_incremental_run_to_1e_12(differenced: bool) -> None:
-    """A whole recording at once, with a gap in it, gives what window by window gives."""
+    """A full recording with a gap at once equals the result window by window."""
     u, y = noise(60_000, 11)
     shape = WindowShape.of("hann", 1024, 0.5)
     windower, transform, running = Windower(shape, 1, int(differenced)), Transformer(shape, differenced), RunningSpectra(shape)
@@ -265,7 +265,7 @@ def test_the_batch_agrees_with_the_incremental_run_to_1e_12(differenced: bool) -
 
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e6])
 def test_the_batch_is_as_exact_in_any_unit(unit: float) -> None:
-    """Both signals share one complex transform: the rounding of the larger one must not show in the smaller one."""
+    """Both signals share one complex transform: rounding of the larger one must not affect the smaller one."""
     u, y = noise(20_000, 12)
     shape = WindowShape.of("hann", 1024, 0.5)
     batch, full = batch_spectra([(0, u, unit * y)], shape, False), full_buffer(u, y, shape, differenced=False)
@@ -274,7 +274,7 @@ def test_the_batch_is_as_exact_in_any_unit(unit: float) -> None:
 
 
 def test_an_output_that_stands_still_has_no_spectrum() -> None:
-    """A constant leaves nothing once its mean is gone, and the input is what it is."""
+    """A constant without its mean is zero, and the input is unchanged."""
     u, y = noise(5_000, 13)
     shape = WindowShape.of("hann", 1024, 0.5)
     still = batch_spectra([(0, u, np.full(u.size, 0.25))], shape, False)
@@ -283,6 +283,6 @@ def test_an_output_that_stands_still_has_no_spectrum() -> None:
 
 
 def test_a_recording_without_a_whole_window_says_how_long_it_is() -> None:
-    """The error names the longest run and what is needed."""
+    """The error gives the longest run and the required length."""
     with pytest.raises(BadInput, match=r"longest gap-free run is 100 samples; allowed: >= 1025"):
         batch_spectra([(0, np.zeros(100), np.zeros(100))], WindowShape.of("hann", 1024, 0.5), True)

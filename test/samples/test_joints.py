@@ -1,4 +1,4 @@
-"""Stamped samples become counted ones."""
+"""Stamped samples get counters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def feed(counter: JointCounter, times: np.ndarray) -> tuple[list[float], list[fl
 
 
 def test_stamps_alone_are_counted_with_jitter_and_losses() -> None:
-    """Jitter of a third of a sample changes nothing; a lost sample leaves its counter free."""
+    """Jitter of a third of a sample has no effect; a lost sample leaves its counter free."""
     random = np.random.default_rng(0)
     times = 5.0 + np.arange(2000) / 125.0 + random.uniform(-0.3, 0.3, 2000) / 125.0 / 2
     kept = np.delete(np.arange(2000), [700, 701, 1500])
@@ -33,7 +33,7 @@ def test_stamps_alone_are_counted_with_jitter_and_losses() -> None:
 
 
 def test_counters_come_from_the_nearest_voltage_sample() -> None:
-    """Position stamps a third of a sample off pair with the voltage sample they belong to."""
+    """Position stamps a third of a sample away are paired with the right voltage sample."""
     counter = JointCounter(("x",), with_voltage=True)
     seq = np.arange(1000.0, 1020.0)
     counter.see_voltage(Block(("x",), seq, seq / 2000.0, np.zeros((20, 1))))
@@ -42,27 +42,27 @@ def test_counters_come_from_the_nearest_voltage_sample() -> None:
 
 
 def test_without_any_voltage_nothing_is_paired_and_memory_stays_bounded() -> None:
-    """Samples wait for the voltage stream, not for ever."""
+    """Samples wait for the voltage stream, for a limited time."""
     counter = JointCounter(("x",), with_voltage=True)
     assert feed(counter, np.arange(5000) / 125.0) == ([], [])
     assert len(counter._early) <= 800
 
 
 def test_repeated_and_backward_stamps_are_left_out() -> None:
-    """A stamp counts once."""
+    """Equal stamps count once."""
     times = np.repeat(np.arange(600) / 125.0, 2)
     seqs, _ = feed(JointCounter(("x",), with_voltage=False), times)
     assert seqs == list(range(600))
 
 
 def test_stamps_that_never_move_give_nothing() -> None:
-    """No rate, no samples, no crash."""
+    """Without a rate or samples there is no error."""
     assert feed(JointCounter(("x",), with_voltage=False), np.zeros(1000)) == ([], [])
     assert feed(JointCounter(("x",), with_voltage=False), np.full(10, np.nan)) == ([], [])
 
 
 def test_a_source_that_starts_again_counts_from_zero() -> None:
-    """Stamps that go back by more than a second are a restart, which the pairing then sees."""
+    """Stamps that go back by more than a second are a restart, which the pairing detects."""
     counter = JointCounter(("x",), with_voltage=False)
     feed(counter, 10.0 + np.arange(600) / 125.0)
     seqs, _ = feed(counter, 2.0 + np.arange(600) / 125.0)
@@ -75,7 +75,7 @@ def voltage(seq: np.ndarray, start: float = 0.0, rate: float = 500.0) -> Block:
 
 @pytest.mark.parametrize("start", [0.0, 1.7e9])
 def test_voltage_in_blocks_of_one_row_teaches_the_rate(start: float) -> None:
-    """One sample a message, since the start or in ROS time: positions get the counter of their voltage."""
+    """One sample per message, with time since the start or ROS time: positions get the counter of their voltage."""
     counter = JointCounter(("x",), with_voltage=True)
     seqs: list[float] = []
     for n in range(1000):
@@ -87,7 +87,7 @@ def test_voltage_in_blocks_of_one_row_teaches_the_rate(start: float) -> None:
 
 
 def test_clocks_that_are_apart_pair_nothing_and_are_named() -> None:
-    """Voltage in seconds since its start and joint states in the epoch: no sample, and by how much."""
+    """Voltage in seconds since its start and joint states since 1970: no sample, and a message with the difference."""
     counter = JointCounter(("x",), with_voltage=True)
     counter.see_voltage(voltage(np.arange(100.0)))
     assert feed(counter, 1.7e9 + np.arange(100) / 500.0) == ([], [])
@@ -98,14 +98,14 @@ def test_clocks_that_are_apart_pair_nothing_and_are_named() -> None:
     ("with_voltage", "stamp", "words"), [(True, 0.0, "the stamps are zero"), (False, 0.0, "the stamps are zero"), (False, 7.5, "stay at 7.5")]
 )
 def test_stamps_that_never_move_are_named(with_voltage: bool, stamp: float, words: str) -> None:
-    """A driver that does not stamp is told so."""
+    """Missing stamps of a driver are reported."""
     counter = JointCounter(("x",), with_voltage)
     feed(counter, np.full(100, stamp))
     assert words in counter.wrong()
 
 
 def test_rates_that_differ_are_named() -> None:
-    """125 joint states a second against 500 samples of voltage: both rates are said; with 20 % of jitter at one rate nothing is."""
+    """125 joint states and 500 samples of voltage per second: a message with both rates; with 20 % of jitter at one rate there is none."""
     random = np.random.default_rng(3)
     for rate, words in ((125.0, "voltage comes at 500 Hz, joint_states at 125"), (500.0, "")):
         counter = JointCounter(("x",), with_voltage=True)
@@ -115,7 +115,7 @@ def test_rates_that_differ_are_named() -> None:
 
 
 def test_each_axis_may_have_a_joint_of_any_spelling() -> None:
-    """Axis=joint; what is not named is its own joint; anything else is refused with an example."""
+    """Axis=joint; an unnamed axis is its own joint; anything else is refused with an example."""
     assert joints_of(("x", "y"), ("y=joint-2",)) == {"x": "x", "y": "joint-2"}
     for entries in (("joint-2",), ("z=a",), ("x=a", "x=b"), ("x=",), ("x=y",)):
         with pytest.raises(BadInput, match="parameter joints"):
@@ -123,7 +123,7 @@ def test_each_axis_may_have_a_joint_of_any_spelling() -> None:
 
 
 def late_cycles(rows: int, period: float, seed: int = 1) -> np.ndarray:
-    """Stamps of a busy computer: one cycle in a hundred begins up to ten periods late, and short ones follow until it has caught up."""
+    """Stamps of a busy computer: one cycle in a hundred begins up to ten periods late, followed by short ones until it has caught up."""
     random, stamps, free = np.random.default_rng(seed), np.zeros(rows), 0.0
     for k in range(rows):
         late = random.uniform(0.0, 10 * period) if random.random() < 0.01 else random.exponential(0.05 * period)
@@ -133,7 +133,7 @@ def late_cycles(rows: int, period: float, seed: int = 1) -> np.ndarray:
 
 
 def test_a_long_stall_that_is_caught_up_with_loses_nothing_and_one_that_is_not_leaves_its_numbers() -> None:
-    """Cycles of 0.4 s that come at once after a stall are all numbered; a source that stood still for 0.4 s leaves a gap; what follows is right."""
+    """Cycles of 0.4 s that arrive at once after a stall are all numbered; a pause of the source of 0.4 s is a gap; later samples are right."""
     even = 100.0 + np.arange(3000) * 0.005
     caught = even.copy()
     caught[1000:1080] = even[1080] + np.arange(80) * 1e-4 - 0.009
@@ -145,14 +145,14 @@ def test_a_long_stall_that_is_caught_up_with_loses_nothing_and_one_that_is_not_l
 
 
 def test_the_rate_is_learnt_where_most_cycles_only_catch_up() -> None:
-    """A very busy computer: bursts of eight cycles every eight periods. The median step is a tenth of a period, and yet nothing is lost."""
+    """A very busy computer: bursts of eight cycles every eight periods. The median step is a tenth of a period, and no sample is lost."""
     bursts = 100.0 + np.repeat(np.arange(400) * 8, 8) * 0.005 + np.tile(np.arange(8), 400) * 0.0005
     seqs, _ = feed(JointCounter(("x",), with_voltage=False), bursts)
     assert seqs == list(range(len(seqs))) and len(seqs) > 3000
 
 
 def test_a_rate_that_was_learnt_while_the_source_caught_up_with_a_stall_is_learnt_anew() -> None:
-    """Its first samples come ten times too fast, then it keeps 200 Hz: after some seconds every sample follows the one before, none is lost."""
+    """The first samples are ten times too fast, then the rate is 200 Hz: after some seconds the counters are consecutive, none is lost."""
     stamps = 100.0 + np.concatenate((np.arange(400) * 0.0005, 0.2 + np.arange(1, 6000) * 0.005))
     counter = JointCounter(("x",), with_voltage=False)
     blocks = [block for time in stamps if (block := counter.add(float(time), np.zeros(1))) is not None]
@@ -164,7 +164,7 @@ def test_a_rate_that_was_learnt_while_the_source_caught_up_with_a_stall_is_learn
 
 @pytest.mark.parametrize("with_voltage", [False, True])
 def test_cycles_that_begin_late_are_no_losses_and_losses_are_found_among_them(with_voltage: bool) -> None:
-    """A late cycle and those that catch up keep their numbers; samples that were lost leave theirs free; instants come out even."""
+    """A late cycle and those that catch up keep their numbers; lost samples leave theirs free; times are evenly spaced."""
     stamps = 1.7e9 + late_cycles(6000, 0.002)
     kept = np.delete(np.arange(6000), [2500, 2501, 4100])
     counter = JointCounter(("x",), with_voltage)

@@ -1,4 +1,4 @@
-"""Bad streams: what is given on, what is refused, and what is said."""
+"""Bad streams: passed and refused samples, and the messages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def block(first: int, n: int = 20, *, axes: tuple[str, ...] = AXES, rate: float 
 
 
 class Machine:
-    """Feeds both streams and keeps what comes out."""
+    """Feeds both streams and stores the output."""
 
     def __init__(self) -> None:
         self.pairer = Pairer(AXES, reorder=0.05)
@@ -86,7 +86,7 @@ def test_pairs_are_made_by_counter_not_by_arrival() -> None:
 
 
 def test_lost_blocks_become_one_gap_each(machine: Machine) -> None:
-    """What never came is given up after the reorder time, and counted."""
+    """Missing samples are given up after the reorder time, and counted."""
     for first in range(1000, 2000, 20):
         machine.voltage(block(first))
         if first not in (1200, 1220, 1600):
@@ -97,7 +97,7 @@ def test_lost_blocks_become_one_gap_each(machine: Machine) -> None:
 
 
 def test_duplicates_change_nothing(machine: Machine) -> None:
-    """A block that comes twice is counted and ignored, even with other values."""
+    """A repeated block is counted and ignored, even with other values."""
     wrong = block(980)
     machine.position(Block(AXES, wrong.seq, wrong.time, wrong.values * 0 - 5))
     machine.both(1000)
@@ -108,7 +108,7 @@ def test_duplicates_change_nothing(machine: Machine) -> None:
 
 
 def test_nan_samples_are_left_out_and_nothing_else(machine: Machine) -> None:
-    """A NaN makes a gap of just those samples, with its reason."""
+    """A NaN gives a gap of exactly those samples, with its reason."""
     bad = block(1000)
     bad.values[3:5, 1] = np.nan
     machine.voltage(block(1000))
@@ -130,7 +130,7 @@ def test_a_jump_of_time_cuts_the_run(machine: Machine) -> None:
 
 
 def test_a_source_that_starts_again_is_followed(machine: Machine) -> None:
-    """Counters from zero again: one gap with its reason, then samples go on."""
+    """Counters restart at zero: one gap with its reason, then samples continue."""
     before = len(machine.samples)
     for first in range(0, 400, 20):
         machine.both(first)
@@ -142,7 +142,7 @@ def test_a_source_that_starts_again_is_followed(machine: Machine) -> None:
 
 
 def test_one_old_block_is_late_not_a_restart(machine: Machine) -> None:
-    """A single straggler from long ago is counted and ignored."""
+    """A single very late sample is counted and ignored."""
     machine.position(block(200))
     machine.both(1000)
     assert machine.heard() == list(range(1020))
@@ -150,7 +150,7 @@ def test_one_old_block_is_late_not_a_restart(machine: Machine) -> None:
 
 
 def test_wrong_columns_are_refused_in_words(machine: Machine) -> None:
-    """The sentence names what came and what was expected; other columns may be there in any order."""
+    """The sentence gives the received and the expected columns; other columns are allowed in any order."""
     machine.position(block(1000, axes=("a", "b")))
     assert machine.pairer.said["wrong_columns"] == "position: columns a, b; expected x, y"
     swapped = block(1000)
@@ -160,7 +160,7 @@ def test_wrong_columns_are_refused_in_words(machine: Machine) -> None:
 
 
 def test_unequal_rates_stop_the_pairing() -> None:
-    """The same counter does not mean the same instant, so nothing is given on."""
+    """Equal counters do not mean equal times, so no sample is passed."""
     machine = Machine()
     for first in range(0, 2000, 20):
         machine.voltage(block(first, rate=2000.0))
@@ -170,7 +170,7 @@ def test_unequal_rates_stop_the_pairing() -> None:
 
 
 def test_silence_of_one_stream_does_not_grow_without_limit(machine: Machine) -> None:
-    """While the encoder is silent the memory stays what it is, and pairing goes on afterwards."""
+    """While the encoder is silent the memory is constant, and pairing continues afterwards."""
     for first in range(1000, 101_000, 1000):
         machine.voltage(block(first, 1000))
     for first in range(101_000, 103_000, 1000):
@@ -182,13 +182,13 @@ def test_silence_of_one_stream_does_not_grow_without_limit(machine: Machine) -> 
 
 @pytest.mark.parametrize("seq", [[0.5, 1.5], [np.nan, 1.0], [5.0, 4.0], [np.inf, 3.0]])
 def test_counters_that_do_not_count_are_refused(machine: Machine, seq: list[float]) -> None:
-    """Not whole, not finite or not increasing."""
+    """Not integer, not finite or not increasing."""
     machine.position(Block(AXES, np.array(seq), np.zeros(2), np.zeros((2, 2))))
     assert machine.pairer.counts["bad_counter"] == 1
 
 
 def abused(seed: int) -> Machine:
-    """A machine that heard blocks lost, doubled, shuffled, shifted in time and spoilt."""
+    """A machine after lost, doubled, shuffled, time-shifted and spoilt blocks."""
     random = np.random.default_rng(seed)
     machine = Machine()
     machine.both(0)
@@ -208,7 +208,7 @@ def abused(seed: int) -> Machine:
 
 
 def test_the_short_way_of_blocks_without_a_fault_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ring.follow takes most blocks; without it samples, gaps and counts are the same, bit for bit."""
+    """Ring.follow accepts most blocks; without it samples, gaps and counts are the same, bit for bit."""
     followed: list[bool] = []
     follow = Ring.follow
 
@@ -230,7 +230,7 @@ def test_the_short_way_of_blocks_without_a_fault_changes_nothing(monkeypatch: py
 
 
 def test_random_abuse_never_crashes_and_never_invents() -> None:
-    """Whatever is lost, doubled, shuffled or spoilt: what comes out was sent, in order, once."""
+    """With any lost, doubled, shuffled or spoilt blocks, each output sample was sent, in order, once."""
     for seed in range(10):
         heard = abused(seed).heard()
         assert heard == sorted(set(heard))
@@ -240,9 +240,9 @@ def test_random_abuse_never_crashes_and_never_invents() -> None:
 @pytest.mark.parametrize("size", [1, 20, 500])
 @pytest.mark.parametrize("rate", [500.0, 1000.0, 1900.0, 1970.0, 4000.0])
 def test_a_rate_that_changes_while_the_counter_goes_on_is_estimated_again(rate: float, size: int) -> None:
-    """2 kHz becomes another rate without a restart: that is said, nothing of both is mixed for long, and pairing goes on at the new one.
+    """2 kHz changes to another rate without a restart: a message, only brief mixing of both, and pairing continues at the new one.
 
-    From 1 kHz to 4 kHz every stamp is so near the one before it that none of them alone tells it.
+    From 1 kHz to 4 kHz no single stamp shows the change.
     """
     machine = Machine()
     for first in range(0, 12_000, size):
@@ -256,7 +256,7 @@ def test_a_rate_that_changes_while_the_counter_goes_on_is_estimated_again(rate: 
 
 
 def test_jitter_stalls_and_a_clock_that_drifts_are_no_other_rate() -> None:
-    """Stamps late by up to half a period, a stall of 15 periods now and then that is caught up, and a clock that is wrong by 500 ppm."""
+    """Stamps late by up to half a period, occasional stalls of 15 periods with catching up, and a clock error of 500 ppm."""
     random = np.random.default_rng(4)
     machine = Machine()
     for first in range(0, 60_000, 20):
@@ -271,7 +271,7 @@ def test_jitter_stalls_and_a_clock_that_drifts_are_no_other_rate() -> None:
 
 
 def test_a_rate_that_one_stream_was_read_wrong_at_does_not_stay() -> None:
-    """The first voltages came while its source caught up with a stall: both rates are estimated again after a while, and samples are paired."""
+    """The first voltages arrive while the source catches up after a stall: both rates are estimated again later, and samples are paired."""
     machine = Machine()
     for first in range(0, 40_000, 20):
         machine.position(block(first))

@@ -1,4 +1,4 @@
-"""The sampling rate from all stamps so far: where it comes to, how sure it is, and what changes nothing about it."""
+"""The sampling rate from all stamps so far: its value, its error, and its invariances."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from xy_sysid.samples.recording import rate_from_time
 
 
 def stamps(rate: float, count: int, jitter: float, seed: int = 0) -> FloatArray:
-    """Of samples that are read up to ``jitter`` periods (rms) early or late."""
+    """Stamps of samples read ``jitter`` periods (rms) early or late."""
     return np.asarray((np.arange(count) + jitter * np.random.default_rng(seed).standard_normal(count)) / rate)
 
 
@@ -24,7 +24,7 @@ def line(time: FloatArray, piece: int = 37) -> StampLine:
 
 
 def test_the_rate_is_within_its_error_and_sharper_with_every_sample() -> None:
-    """20 % of jitter at 503.7 Hz, 60 times over: of normal errors 95 % are within two standard errors, and the error falls as n^-3/2."""
+    """20 % of jitter at 503.7 Hz, 60 times: 95 % of the errors are within two standard errors, and the error falls as n^-3/2."""
     off = []
     for seed in range(60):
         found = line(stamps(503.7, 6000, 0.2, seed))
@@ -36,7 +36,7 @@ def test_the_rate_is_within_its_error_and_sharper_with_every_sample() -> None:
 
 
 def test_jitter_that_hangs_together_counts() -> None:
-    """A late cycle makes its neighbours late: over independent stamps the error would be told several times too small."""
+    """A late cycle delays its neighbours: for assumed independent stamps the error would be several times too small."""
     random = np.random.default_rng(4)
     off = []
     for _ in range(40):
@@ -48,7 +48,7 @@ def test_jitter_that_hangs_together_counts() -> None:
 
 
 def test_pieces_change_nothing_to_the_last_bit() -> None:
-    """Blocks of any size give the same figures: what is live is what is replayed."""
+    """Blocks of any size give the same numbers, live and replayed."""
     time = stamps(500.0, 5003, 0.2)
     one = StampLine()
     one.add(0, time)
@@ -58,7 +58,7 @@ def test_pieces_change_nothing_to_the_last_bit() -> None:
 
 
 def test_losses_and_jumps_of_the_clock_do_no_harm() -> None:
-    """A hole in the counter lies on the line; after a jump of the clock a new line of the same rate begins, and both count."""
+    """A gap in the counter is on the line; after a jump of the clock a new line of the same rate begins, and both count."""
     time = stamps(503.7, 8000, 0.05)
     found = StampLine()
     found.add(0, time[:3000])
@@ -74,7 +74,7 @@ def test_losses_and_jumps_of_the_clock_do_no_harm() -> None:
 
 @pytest.mark.parametrize("place", [3000, 3015, 3035, 3049])
 def test_a_number_that_slips_begins_a_new_stretch(place: int) -> None:
-    """One sample that nobody counted, wherever in a batch: taken for a part of the line it would turn it by many of its errors."""
+    """One uncounted sample, anywhere in a batch: as part of the line it would change the slope by many standard errors."""
     time = stamps(503.7, 6000, 0.1)
     found = StampLine()
     found.add(0, np.delete(time, place))
@@ -83,14 +83,14 @@ def test_a_number_that_slips_begins_a_new_stretch(place: int) -> None:
 
 
 def test_few_stamps_tell_nothing_and_even_ones_all() -> None:
-    """As long as no error can be told there is no rate; without jitter there is no error, and whole numbers stay whole."""
+    """Without an error estimate there is no rate; without jitter the error is zero, and integers stay exact."""
     assert line(stamps(500.0, 4 * BATCH, 0.0)).rate is None
     even = line(stamps(2000.0, 4000, 0.0))
     assert even.rate == 2000.0 and even.error < 1e-12
 
 
 def test_the_first_stamps_give_the_rate_by_a_straight_line() -> None:
-    """200 stamps with 20 % of jitter: several times nearer than the first and the last alone would be."""
+    """200 stamps with 20 % of jitter: the error is several times smaller than from the first and the last alone."""
     seq = np.arange(200)
     off = [rate_from_time(stamps(500.0, 200, 0.1, seed), seq) / 500.0 - 1.0 for seed in range(200)]
     ends = [199.0 / (time[-1] - time[0]) / 500.0 - 1.0 for time in (stamps(500.0, 200, 0.1, seed) for seed in range(200))]
@@ -98,7 +98,7 @@ def test_the_first_stamps_give_the_rate_by_a_straight_line() -> None:
 
 
 def test_a_recording_tells_how_sure_its_rate_is() -> None:
-    """From its stamps; 0 where they are even."""
+    """From its stamps; 0 for evenly spaced ones."""
     seq = np.arange(6000)
     assert error_of_rate(stamps(500.0, 6000, 0.2), seq) == pytest.approx(0.2 * np.sqrt(12.0) * 6000.0**-1.5, rel=0.5)
     assert error_of_rate(seq / 500.0, seq) < 1e-12

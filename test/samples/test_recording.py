@@ -1,4 +1,4 @@
-"""A recording tells its longest stretch without a gap, once for everybody."""
+"""The longest stretch of a recording without a gap."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RATE = 1000.0
 
 
 def recording(seq: list[int]) -> Recording:
-    """Two axes, whose samples are told by their counter."""
+    """Two axes, whose samples are identified by their counter."""
     count = np.array(seq, dtype=np.int64)
     values = np.column_stack((count, -count)).astype(np.float64)
     return Recording(RATE, ("x", "y"), count, count / RATE, values, 0.001 * values, input_unit="A")
@@ -32,7 +32,7 @@ def test_the_run_of_an_axis_is_its_longest_stretch_without_a_gap() -> None:
 
 
 def test_ends_at_which_an_axis_is_not_driven_and_stands_are_left_out() -> None:
-    """Whoever starts a bag early and stops it late; a second of each end stays, and what still moves, or waits in the middle."""
+    """Long rests at the ends of a bag are removed except for a second; motion, and rests in between, are kept."""
     rest, noise = np.zeros(4000), np.random.default_rng(0)
     drive = noise.standard_normal(3000)
     u = np.concatenate((rest, drive, rest, drive, rest))
@@ -46,7 +46,7 @@ def test_ends_at_which_an_axis_is_not_driven_and_stands_are_left_out() -> None:
 
 
 def test_an_axis_that_is_not_there_and_a_recording_without_samples_are_told() -> None:
-    """One line that names what is allowed; no empty answer."""
+    """One line with the allowed values; no empty answer."""
     with pytest.raises(BadInput, match="x, y"):
         recording([0, 1]).run("z")
     with pytest.raises(BadInput, match="1 or more"):
@@ -54,7 +54,7 @@ def test_an_axis_that_is_not_there_and_a_recording_without_samples_are_told() ->
 
 
 def test_nobody_else_looks_for_the_longest_stretch() -> None:
-    """Surfaces ask the recording."""
+    """Commands and page use the method of the recording."""
     for path in (ROOT / "xy_sysid").rglob("*.py"):
         if path.parts[-2:] != ("samples", "recording.py"):
             assert "max(recording.runs()" not in path.read_text(encoding="utf-8").replace("self._", ""), path

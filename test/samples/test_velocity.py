@@ -1,4 +1,4 @@
-"""Velocities of joint states: what a message gives, and the position they become as they come in."""
+"""Velocities of joint states: the fields of a message, and their integration to a position."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAN = float("nan")
 
 @dataclass
 class Message:
-    """As a driver fills it."""
+    """A message as filled by a driver."""
 
     name: list[str] = field(default_factory=lambda: ["right", "left"])
     position: list[float] = field(default_factory=list)
@@ -58,7 +58,7 @@ def reader(output: JointOutput, effort: bool = False) -> JointReader:
     ],
 )
 def test_a_message_without_the_field_says_which_one_there_is(output: JointOutput, message: Message, words: str) -> None:
-    """The field, what is wrong with it, and the setting that takes what the driver does give."""
+    """The field, its problem, and the setting for the fields that the driver provides."""
     if words.startswith("positions of right"):
         message.name = ["left", "right"]
     told = reader(output).wrong(message)
@@ -72,7 +72,7 @@ def test_efforts_that_are_not_there_are_told_apart_from_the_output() -> None:
 
 
 def test_a_row_has_the_joints_in_the_order_of_the_axes() -> None:
-    """Output first, then effort; whatever the order in the message; NaN in between is a fault of that sample and no fault of the driver."""
+    """Output first, then effort, for any order in the message; a NaN is a fault of that sample, not of the driver."""
     one = reader("velocity", effort=True)
     message = Message(velocity=[1.0, 2.0], effort=[3.0, 4.0])
     assert one.wrong(message) == "" and one.row(message).tolist() == [2.0, 1.0, 4.0, 3.0]
@@ -81,14 +81,14 @@ def test_a_row_has_the_joints_in_the_order_of_the_axes() -> None:
 
 
 def moved(seq: FloatArray, velocity: FloatArray, period: float = 0.01, pieces: int = 1) -> FloatArray:
-    """As it comes out of a path that gets it in so many pieces."""
+    """The result of a path that gets it in this many pieces."""
     path = Path(velocity.shape[1])
     parts = [path.add(one, values, period) for one, values in zip(np.array_split(seq, pieces), np.array_split(velocity, pieces), strict=True)]
     return np.concatenate(parts)
 
 
 def test_live_and_of_a_file_a_velocity_becomes_the_same_position_in_pieces_of_any_length() -> None:
-    """The law of the importers, to the last bit; over a gap the velocity is held."""
+    """The rule of the importers, bit for bit; over a gap the velocity is held."""
     seq = np.r_[0.0:300.0, 340.0:800.0]
     velocity = np.random.default_rng(1).normal(size=(len(seq), 2))
     whole = integral(velocity, np.diff(seq) * 0.01)
@@ -102,7 +102,7 @@ def test_live_and_of_a_file_a_velocity_becomes_the_same_position_in_pieces_of_an
 
 @pytest.mark.parametrize(("wrong", "lost"), [(NAN, 50), (np.inf, 50), (1e30, 51)])
 def test_a_velocity_that_is_none_leaves_no_trace_in_what_follows(wrong: float, lost: int) -> None:
-    """One sample has no position, and from the next one on every step is a velocity that was measured, to full precision."""
+    """One sample has no position, and from the next one on every step is a measured velocity, to full precision."""
     seq, velocity = np.arange(200.0), np.random.default_rng(2).normal(size=(200, 2))
     damaged = velocity.copy()
     damaged[50, 1] = wrong
@@ -113,7 +113,7 @@ def test_a_velocity_that_is_none_leaves_no_trace_in_what_follows(wrong: float, l
 
 
 def test_a_gap_a_restart_and_an_endless_run_leave_the_steps_right() -> None:
-    """Within each part every step is what was measured; a counter that goes back adds nothing; no position grows out of a double's sight."""
+    """Within each part every step is the measured one; a counter that goes back adds nothing; positions stay within double precision."""
     velocity = np.random.default_rng(3).normal(size=(400, 1))
     parts = (slice(0, 100), slice(100, 250), slice(250, 400))
     found = moved(np.r_[0.0:100.0, 5000.0:5150.0, 0.0:150.0], velocity)
@@ -154,7 +154,7 @@ def test_joint_states_of_velocities_are_counted_and_become_positions(with_voltag
 
 
 def test_the_unit_of_a_velocity_and_that_of_its_position_mean_the_same() -> None:
-    """Whoever says rad/s of a velocity gets answers in rad, as one who says rad; of a position rad/s stays what was said."""
+    """A unit of rad/s for a velocity gives answers in rad, like rad; for a position, rad/s is kept."""
     for said in ("rad", "rad/s"):
         assert IdentifierSettings(output="velocity", input_unit="N m", output_unit=said).units == ("N m", "rad")
         assert DiagnoserSettings(output="velocity", output_unit=said).units.speed == "rad/s"

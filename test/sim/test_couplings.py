@@ -1,4 +1,4 @@
-"""Two simulated axes that move each other, with a truth that is known, and the verdict on whether two single-axis models suffice."""
+"""Two simulated axes that move each other, with known truth, and the verdict on whether two single-axis models suffice."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def machine(**values: float) -> Machine:
 
 
 def measured(table: Machine) -> Coupling:
-    """What a minute of two independent noises tells."""
+    """The result of a minute with two independent noises."""
     axes = {name: AxisExcitation(seed=11 + k) for k, name in enumerate(table.axes)}
     recording = drive(table, ExcitationSettings(rate=table.rate, lockstep=True, speed=0.0, axes=axes), SECONDS)
     return coupling(recording, SHAPE, BAND)
 
 
 def truth(table: Machine, frequency: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """(n,) what each axis reads of the other's motion, over what the other reads of its own."""
+    """(n,) reading of each axis of the other's motion, over the other's reading of its own."""
     mix = table.mixing(frequency)
     return mix[:, 0, 1] / mix[:, 1, 1], mix[:, 1, 0] / mix[:, 0, 0]
 
@@ -53,7 +53,7 @@ def test_coupled_axes_are_found_with_their_size(what: dict[str, float]) -> None:
 
 
 def test_the_largest_coupling_is_where_the_base_swings() -> None:
-    """A base at 60 Hz: the band that is named holds that frequency."""
+    """A base at 60 Hz: the named band contains that frequency."""
     found = measured(machine(base_mass=300.0, base_frequency=60.0, base_damping=0.02))
     worst = int(np.argmax(found.coupling))
     assert found.band_edges[worst] <= 60.0 <= found.band_edges[worst + 1]
@@ -61,7 +61,7 @@ def test_the_largest_coupling_is_where_the_base_swings() -> None:
 
 @pytest.mark.parametrize("what", [{}, {"skew": 0.001, "base_mass": 60_000.0}])
 def test_axes_that_hardly_move_each_other_need_no_common_model(what: dict[str, float]) -> None:
-    """Nothing, a milliradian, a base of 60 t: at most so many per cent, which is no less than the truth, and two single-axis models suffice."""
+    """None, a milliradian, a base of 60 t: an upper limit in per cent, not below the truth, and two single-axis models suffice."""
     table = machine(**what)
     found = measured(table)
     assert found.suffice and "two single-axis models suffice" in found.sentence, found.sentence
@@ -69,7 +69,7 @@ def test_axes_that_hardly_move_each_other_need_no_common_model(what: dict[str, f
 
 
 def test_any_blocks_give_the_same_positions() -> None:
-    """The base goes on swinging from block to block, bit for bit, and reset begins anew."""
+    """The base's oscillation continues from block to block, bit for bit, and reset starts again."""
     table = machine(skew=0.05, base_mass=100.0)
     volts = np.random.default_rng(1).normal(size=(500, 2))
     whole = table.step(volts)
@@ -79,7 +79,7 @@ def test_any_blocks_give_the_same_positions() -> None:
 
 
 def test_one_axis_cannot_be_coupled(tmp_path: Path) -> None:
-    """A machine file with coupling needs two axes; one that comes along has them."""
+    """A machine file with coupling needs two axes; one of the package has them."""
     assert Machine.from_file("coupled.yaml").spec.coupling.any
     path = tmp_path / "one.yaml"
     path.write_text("base: joint.yaml\ncoupling: {skew: 0.1}\n")

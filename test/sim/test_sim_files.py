@@ -1,4 +1,4 @@
-"""Machine files, effects as text, drawn effects, and the document made from them."""
+"""Machine files, effects as text, random effects, and the document made from them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def part_names(machine: Machine, axis: str = "x") -> list[str]:
 
 
 def test_there_is_a_part_for_every_effect_name_and_two_that_no_hypothesis_knows() -> None:
-    """The design's list, in full, and surprises."""
+    """The full list of the design, and surprise parts."""
     assert {name for name, part in PARTS.items() if part.group in ("base", "effect", "added")} == DESIGN | MORE
     assert sum(part.group == "outside" for part in PARTS.values()) >= 2
 
@@ -64,7 +64,7 @@ def test_paper_yaml_is_the_table_of_the_paper() -> None:
 
 
 def test_loose_bolts_lower_the_pair_by_more_than_a_hertz_while_it_runs() -> None:
-    """The alarm has something to see on both axes, and nothing before half a minute."""
+    """Both axes have a shift for the alarm, and none before half a minute."""
     machine = Machine.from_file("loose_bolts.yaml")
     for axis, fall in (("x", 1.9), ("y", 0.9)):
         before, start, late = (machine.truth(axis, time)["resonance_hz"] for time in (0.0, 30.0, 60.0))
@@ -97,7 +97,7 @@ def test_loose_bolts_lower_the_pair_by_more_than_a_hertz_while_it_runs() -> None
     ],
 )
 def test_a_mistake_in_a_machine_file_is_one_line_that_says_what_to_do(text: str, says: str, tmp_path: Path) -> None:
-    """What, what is allowed, the nearest spelling."""
+    """The wrong value, the allowed ones, the nearest spelling."""
     path = tmp_path / "machine.yaml"
     path.write_text(text)
     with pytest.raises(BadInput) as caught:
@@ -107,7 +107,7 @@ def test_a_mistake_in_a_machine_file_is_one_line_that_says_what_to_do(text: str,
 
 
 def test_a_file_adds_to_its_base_and_can_take_parts_away(tmp_path: Path) -> None:
-    """Axes and parts are merged by name; numbers such as 1e-7, which YAML 1.1 takes for text, are numbers."""
+    """Axes and parts are merged by name; numbers such as 1e-7, which YAML 1.1 reads as text, are numbers."""
     path = tmp_path / "machine.yaml"
     path.write_text('base: paper.yaml\naxes:\n  "x":\n    encoder_noise: 1e-7\n    parts: {base_resonance: false, backlash: {gap: 3e-5}}\n')
     machine = Machine.from_file(path)
@@ -118,7 +118,7 @@ def test_a_file_adds_to_its_base_and_can_take_parts_away(tmp_path: Path) -> None
 
 
 def test_effects_are_read_as_users_type_them() -> None:
-    """Axis, name, size, parameters; the last word on a name counts."""
+    """Axis, name, size, parameters; the last entry for a name counts."""
     machine = effect_text.with_effects(
         Machine.from_file("rigid.yaml"), ["coulomb_friction", "coulomb_friction=0.3", "y:stribeck_friction=0.2,velocity=0.02"]
     )
@@ -137,14 +137,14 @@ def test_an_effect_that_is_mistyped_is_refused(text: str) -> None:
 
 
 def test_a_seed_draws_the_same_machine_again_and_another_seed_another() -> None:
-    """hidden(seed) is reproducible, and its effects are not the same on both axes for all seeds."""
+    """hidden(seed) is reproducible, and its effects differ between the axes for some seeds."""
     assert hidden(4).truth("x") == hidden(4).truth("x") == Machine.from_file("hidden.yaml", seed=4).truth("x")
     assert len({str(hidden(seed).truth("x")["parts"]) for seed in range(20)}) == 20
     assert any(part_names(hidden(seed)) != part_names(hidden(seed), "y") for seed in range(5))
 
 
 def test_what_is_drawn_is_what_was_asked_for() -> None:
-    """Counts, groups, one of a family, sizes within the drawn range; every effect turns up."""
+    """Counts, groups, one of a family, sizes within the range; every effect occurs."""
     seen: set[str] = set()
     for seed in range(120):
         machine = draw(seed, effects=(1, 3))
@@ -164,7 +164,7 @@ def test_what_is_drawn_is_what_was_asked_for() -> None:
 
 
 def test_drawn_sizes_can_be_scaled() -> None:
-    """A tenth of the size is a tenth of the size, by the power with which each parameter goes; what is not a size stays."""
+    """A tenth of the size scales each parameter by its power; other parameters are unchanged."""
     seen = set()
     for seed in range(8, 24):
         whole, tenth = draw(seed, 1), draw(seed, 1, scale=0.1)
@@ -178,7 +178,7 @@ def test_drawn_sizes_can_be_scaled() -> None:
 
 
 def test_an_installation_is_searched_where_ros_keeps_its_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """AMENT_PREFIX_PATH is looked through for share/xy_sysid/config/machines."""
+    """AMENT_PREFIX_PATH is searched for share/xy_sysid/config/machines."""
     folder = tmp_path / "share" / "xy_sysid" / "config" / "machines"
     folder.mkdir(parents=True)
     (folder / "mine.yaml").write_text(GOOD)

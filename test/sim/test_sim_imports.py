@@ -1,4 +1,4 @@
-"""The simulated machine and the identification know nothing of each other."""
+"""The simulated machine and the identification are independent."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ADAPTERS = {
     "ballscrew_node.py",
     "controller_node.py",
     "trajectory_node.py",
-}  # the ROS side of the machine: they share the plumbing of nodes, too
+}  # the ROS side of the machine: it also uses the common modules of nodes
 SIM = sorted((ROOT / "xy_sim").rglob("*.py"))
 CORE = sorted(path for path in (ROOT / "xy_sysid").rglob("*.py") if "cli" not in path.relative_to(ROOT / "xy_sysid").parts)
 
@@ -33,14 +33,14 @@ def imported(path: Path) -> Iterator[str]:
 
 @pytest.mark.parametrize("path", SIM, ids=lambda path: str(path.relative_to(ROOT)))
 def test_the_simulator_imports_no_physics_of_the_identification(path: Path) -> None:
-    """xy_sim may use the errors, settings, blocks, compiler and bounded YAML of xy_sysid, its ROS node also the plumbing of nodes; nothing else."""
+    """xy_sim may use the errors, settings, blocks, compiler and bounded YAML of xy_sysid, its ROS node also the common modules of nodes."""
     foreign = {name for name in imported(path) if name.split(".")[0] == "xy_sysid"}
     shared = SHARED | {"xy_sysid.nodes", "xy_sysid.live.recent"} if path.name in ADAPTERS else SHARED
     assert {name for name in foreign if not any(name == module or name.startswith(f"{module}.") for module in shared)} == set()
 
 
 def test_no_module_of_the_identification_but_the_command_line_imports_the_simulator() -> None:
-    """What is judged by the truth cannot look at it."""
+    """xy_sysid cannot import the truth that it is compared with."""
     assert len(SIM) > 20
     assert len(CORE) > 3
     assert [str(path) for path in CORE if any(name.split(".")[0] == "xy_sim" for name in imported(path))] == []

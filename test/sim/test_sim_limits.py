@@ -1,4 +1,4 @@
-"""Each part meets the limit that a textbook gives for it: steady speeds, resting places, thresholds, gaps."""
+"""Each part agrees with its textbook limits: steady speeds, rest positions, thresholds, gaps."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def speed(machine: Machine, volts: float, seconds: float = 0.5) -> float:
 @pytest.mark.parametrize("machine", ["rigid.yaml", "paper.yaml"])
 @pytest.mark.parametrize("volts", [0.01, -1.0])
 def test_steady_speed_is_gain_times_voltage(machine: str, volts: float) -> None:
-    """The velocity gain of the machine file is what the encoder shows."""
+    """The velocity gain of the machine file is that of the encoder."""
     table = Machine.from_file(machine, clean=True)
     assert speed(table, volts, 1.0) == pytest.approx(GAIN * volts, rel=1e-6)
     assert table.truth("x")["velocity_gain"] == pytest.approx(GAIN, rel=1e-12)
@@ -60,7 +60,7 @@ def test_steady_speed_is_gain_times_voltage(machine: str, volts: float) -> None:
     ],
 )
 def test_steady_speed_shows_what_a_part_eats(name: str, values: dict[str, float], volts: float, eaten: float) -> None:
-    """In steady motion the voltage that is left over goes into speed."""
+    """In steady motion the voltage minus friction is proportional to speed."""
     assert speed(rigid(**{name: values}), volts) == pytest.approx(GAIN * (volts - eaten), rel=1e-6)
 
 
@@ -82,7 +82,7 @@ def test_nothing_moves_below_breakaway(name: str, values: dict[str, float], hold
 
 
 def test_coulomb_friction_stops_a_coasting_table_for_good() -> None:
-    """After the voltage is gone, speed reaches zero when m v' = -drag v - friction says, and stays."""
+    """After the voltage is off, speed reaches zero at the time of m v' = -drag v - friction, and stays zero."""
     machine = rigid(coulomb_friction={"coulomb": 0.3})
     positions(machine, 1.0)
     start = speed(machine, 1.0, 0.05)
@@ -94,7 +94,7 @@ def test_coulomb_friction_stops_a_coasting_table_for_good() -> None:
 
 
 def test_stribeck_friction_lets_go_with_a_jerk() -> None:
-    """A little above breakaway the table ends at a speed that the lower friction allows, not near zero."""
+    """Slightly above breakaway the table reaches the speed of the lower friction, not near zero."""
     final = speed(rigid(stribeck_friction={"excess": 0.2, "coulomb": 0.3, "velocity": 0.01}), 0.52)
     left = 0.52 - 0.3 - 0.2 * math.exp(-((final / 0.01) ** 2))
     assert final > 0.015
@@ -102,7 +102,7 @@ def test_stribeck_friction_lets_go_with_a_jerk() -> None:
 
 
 def test_presliding_is_a_spring_that_keeps_a_permanent_set() -> None:
-    """A slow ramp to half the level moves length ln 2; going back to zero volts leaves a rest."""
+    """A slow ramp to half the level moves by length ln 2; back at zero volts a part of it remains."""
     machine = rigid(presliding_hysteresis={"coulomb": 0.3, "length": 10e-6})
     up = positions(machine, np.linspace(0.0, 0.15, 4000))[-1]
     back = positions(machine, np.linspace(0.15, 0.0, 4000))[-1]
@@ -111,12 +111,12 @@ def test_presliding_is_a_spring_that_keeps_a_permanent_set() -> None:
 
 
 def test_a_load_is_held_by_its_voltage() -> None:
-    """With the voltage there before the load can pull, nothing moves once the delay is none."""
+    """If the voltage acts before the load, without delay there is no motion."""
     assert np.abs(positions(rigid(constant_load={"load": 0.3}, time_delay=0.0), 0.3)).max() < 1e-15
 
 
 def test_cogging_holds_a_voltage_below_its_amplitude_and_repeats_along_the_travel() -> None:
-    """At rest A sin(k q) = V; well driven, the speed's ripple has the period lead / per_revolution."""
+    """At rest A sin(k q) = V; in motion, the speed's ripple has the period lead / per_revolution."""
     parts: dict[str, Any] = {"cogging": {"amplitude": 0.2, "per_revolution": 4.0}}
     k = 2 * math.pi * 4 / 0.005
     assert positions(rigid(**parts), np.r_[np.linspace(0, 0.1, 2000), np.full(1000, 0.1)])[-1] == pytest.approx(math.asin(0.5) / k, rel=1e-6)
@@ -128,14 +128,14 @@ def test_cogging_holds_a_voltage_below_its_amplitude_and_repeats_along_the_trave
 
 
 def test_lead_error_is_what_the_encoder_reads_beyond_the_motion() -> None:
-    """Reading less motion is amplitude sin(2 pi q / lead), and the motion itself does not feel it."""
+    """Reading minus motion is amplitude sin(2 pi q / lead), and the motion is not affected."""
     machine, plain = rigid(lead_error={"amplitude": 8e-6, "per_revolution": 1.0}), rigid()
     read, moved = positions(machine, 1.0), positions(plain, 1.0)
     assert np.allclose(read - moved, 8e-6 * np.sin(2 * np.pi * moved / 0.005), rtol=0.0, atol=1e-15)
 
 
 def test_backlash_is_as_wide_as_its_gap() -> None:
-    """Driven one way and then the other, motor and table change sides by the gap, and the flanks' give."""
+    """After a reversal, motor minus table changes by the gap and the flanks' compliance."""
     machine = rigid(backlash={"gap": 20e-6})
     sides = []
     for volts in (1.0, -1.0):
@@ -148,7 +148,7 @@ def test_backlash_is_as_wide_as_its_gap() -> None:
 
 
 def test_inside_the_gap_the_motor_moves_alone() -> None:
-    """Before contact the table has not moved and the motor has its own mass only."""
+    """Before contact the table does not move and the motor has only its own mass."""
     machine = rigid(backlash={"gap": 1e-3}, time_delay=0.0)
     y = positions(machine, 1.0, 0.0055)
     drive = machine.spec.axes[0].drive
@@ -160,7 +160,7 @@ def test_inside_the_gap_the_motor_moves_alone() -> None:
 
 
 def test_a_soft_screw_winds_up_by_force_over_stiffness_and_shows_its_antiresonance() -> None:
-    """Windup in steady motion is guide drag over stiffness; the motor encoder's zero is the table on the screw."""
+    """The deflection in steady motion is guide drag over stiffness; the antiresonance at the motor encoder is the table on the screw."""
     machine = rigid(screw_compliance={"frequency": 110.0, "damping": 0.0})
     positions(machine, 1.0, 1.0)
     drive, state = machine.spec.axes[0].drive, machine.state("x")
@@ -195,7 +195,7 @@ def test_a_base_rings_at_its_frequency_while_friction_locks_the_screw_and_falls_
 
 
 def test_the_base_gives_way_against_the_push() -> None:
-    """Without a spring to speak of, table and base share no momentum that nobody gave them."""
+    """With a negligible spring, the momentum of table and base is conserved."""
     machine = rigid(base_resonance={"frequency": 1.0, "damping": 0.0}, time_delay=0.0)
     positions(machine, 5.0, 0.002)
     state, base = machine.state("x"), machine.spec.axes[0].parts["base_resonance"]["mass"]
@@ -205,7 +205,7 @@ def test_the_base_gives_way_against_the_push() -> None:
 
 
 def test_friction_must_hold_a_resting_table_against_its_inertia_on_a_swinging_base() -> None:
-    """With the screw stuck, table and base are one mass on the spring; friction carries the table's share."""
+    """With the table held by friction, table and base are one mass on the spring."""
     axis = rigid(base_resonance={"frequency": 46.2, "mass": 120.0, "damping": 0.0}, coulomb_friction=1.0).spec.axes[0]
     states = np.zeros((2, len(STATES)))
     states[0, BASE] = 1e-4
@@ -223,7 +223,7 @@ def test_a_hardening_spring_balances_the_voltage_at_the_cube_root() -> None:
 
 @pytest.mark.parametrize(("volts", "values", "where"), [(0.5, {}, 0.05), (0.5, {"rest": 0.02}, 0.07), (0.0, {"rest": 0.02, "softening": 30.0}, 0.02)])
 def test_a_return_spring_balances_the_voltage_by_its_stretch(volts: float, values: dict[str, float], where: float) -> None:
-    """At rest stiffness (q - rest) = V; without a voltage it brings the table back to where it neither pulls nor pushes."""
+    """At rest stiffness (q - rest) = V; without voltage the table returns to the rest position."""
     assert positions(rigid(return_spring={"stiffness": 10.0, **values}), volts, 12.0)[-1] == pytest.approx(where, rel=1e-4)
 
 
@@ -236,13 +236,13 @@ def test_a_softening_spring_gives_way_further() -> None:
 
 @pytest.mark.parametrize(("volts", "phase", "where"), [(0.5, 0.0, np.pi / 6), (-0.5, 0.0, -np.pi / 6), (0.0, 0.7, -0.7), (0.5, -1.0, 1 + np.pi / 6)])
 def test_a_weight_is_held_by_its_sine_and_hangs_without_a_voltage(volts: float, phase: float, where: float) -> None:
-    """At rest amplitude sin(q + phase) = V, on a joint that turns far."""
+    """At rest amplitude sin(q + phase) = V, on a joint with large rotation."""
     joint = Machine.from_file("joint.yaml", clean=True).with_parts({"gravity": {"amplitude": 1.0, "phase": phase}})
     assert joint.step(np.full((10_000, 1), volts))[-1, 0] == pytest.approx(where, rel=1e-6)
 
 
 def test_drag_that_rises_along_the_travel_divides_the_speed_there() -> None:
-    """Where the drag is 1.3 times that of the middle the steady speed is 1.3 times lower."""
+    """At 1.3 times the drag of the middle the steady speed is 1.3 times lower."""
     y = positions(rigid(position_dependent_drag=3.0), 0.1, 13.0)
     there = int(np.argmin(np.abs(y - 0.1)))
     assert (y[there + 1] - y[there]) * 2000.0 == pytest.approx(0.1 * GAIN / 1.3, rel=1e-3)
@@ -267,7 +267,7 @@ def test_quadratic_drag_solves_its_quadratic() -> None:
 
 
 def test_a_stronger_motor_constant_brakes_more_than_it_pushes() -> None:
-    """Where the constant is 1.5 times its mean the steady speed is 1.5 times lower, for back-EMF grows with its square."""
+    """At 1.5 times the mean motor constant the steady speed is 1.5 times lower, because back-EMF grows with its square."""
     y = positions(rigid(position_dependent_gain={"depth": 0.5, "period": 0.4}), 0.5, 3.0)
     peak = int(np.argmin(np.abs(y - 0.1)))
     assert (y[peak + 1] - y[peak - 1]) * 1000.0 == pytest.approx(GAIN * 0.5 / 1.5, rel=1e-3)
@@ -293,7 +293,7 @@ def test_warm_grease_drags_less() -> None:
 
 @pytest.mark.parametrize("name", PARTS)
 def test_every_part_says_what_it_is(name: str) -> None:
-    """Law, meaning, source and parameters with units, ranges that hold their defaults; and its default size is felt."""
+    """Law, meaning, source and parameters with units, ranges that contain their defaults; and the default size has an effect."""
     part = PARTS[name]
     assert part.law and part.meaning and part.source
     for item in part.parameters:

@@ -1,4 +1,4 @@
-"""The machine as a whole: blocks, seeds, encoder, end stops, changes."""
+"""The full machine: blocks, seeds, encoder, end stops, changes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def noise(n: int, rms: float = 1.0, seed: int = 5) -> FloatArray:
 @pytest.mark.parametrize("effects", [{}, EVERYTHING, {"presliding_hysteresis": {}}], ids=["paper", "everything", "presliding"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_any_split_into_blocks_gives_the_same_positions_bit_for_bit(effects: dict[str, dict[str, float]], seed: int) -> None:
-    """Chunking must not matter."""
+    """The result is independent of chunking."""
     machine = Machine.from_file("paper.yaml", seed=3).with_parts(effects)
     u = noise(700)
     whole = machine.step(u)
@@ -54,7 +54,7 @@ def test_the_encoder_counts_half_a_micrometre_and_clean_does_not() -> None:
 
 
 def test_a_row_is_read_before_its_voltage_acts() -> None:
-    """Row k of the answer belongs to the instant at which row k of the voltage begins to be held."""
+    """Row k of the answer belongs to the start of the hold of row k of the voltage."""
     machine = Machine.from_file("rigid.yaml", clean=True).with_parts({"time_delay": 0.0})
     y = machine.step(np.ones((3, 2)))
     assert y[0].tolist() == [0.0, 0.0]
@@ -64,7 +64,7 @@ def test_a_row_is_read_before_its_voltage_acts() -> None:
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_end_stops_hold_the_table_and_lose_energy(direction: float) -> None:
-    """Driven into a stop it stays within what the contact's stiffness allows, and settles there."""
+    """Driven into a stop it stays within the compliance of the contact, and settles there."""
     machine = Machine.from_file("rigid.yaml", clean=True)
     y = machine.step(np.full((9000, 2), 5.0 * direction))[:, 0] * direction
     force = 5.0 * machine.truth("x")["force_per_volt"]
@@ -74,7 +74,7 @@ def test_end_stops_hold_the_table_and_lose_energy(direction: float) -> None:
 
 
 def test_the_rate_is_a_parameter() -> None:
-    """Half the rate, the same motion at the same instants when the voltage is the same."""
+    """At half the rate, the same voltage gives the same motion at the same times."""
     machine = Machine.from_file("paper.yaml", clean=True)
     slow = Machine(replace(machine.spec, rate=1000.0), clean=True)
     u = noise(200)
@@ -99,7 +99,7 @@ def test_the_truth_is_json() -> None:
 
 
 def test_a_machine_too_fast_for_its_inner_step_is_refused() -> None:
-    """Rather than numbers without meaning: the least inner rate is named, and with it the machine is steady."""
+    """Instead of meaningless numbers, an error gives the least inner rate, with which the machine is stable."""
     machine = Machine.from_file("rigid.yaml", clean=True)
     with pytest.raises(BadInput, match=r"inner_rate is 40000; allowed: at least 6\.67e\+04 Hz"):
         machine.with_parts({"amplifier_lag": 1e-5})

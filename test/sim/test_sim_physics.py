@@ -1,4 +1,4 @@
-"""Each part on its own: the inner step does not show, energy never appears, the linear ones obey their truth."""
+"""Each part alone: no influence of the inner step, no gain of energy, and linear parts agree with their truth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from xy_sysid.samples.block import FloatArray
 
 TENTH_OF_A_COUNT = 0.05e-6
 EXACT = [name for name, part in PARTS.items() if part.group != "imperfection"]  # dirt: test_sim_imperfections.py
-SIZES: dict[str, object] = {"base_loosening": {"start": 0.5}}  # else it would begin after the test
+SIZES: dict[str, object] = {"base_loosening": {"start": 0.5}}  # otherwise it would begin after the test
 LINEAR = ["paper", "amplifier_lag", "screw_compliance", "viscous_friction", "constant_stiffness", "attached_mass", "on_table", "time_delay"]
 LINEAR += ["weak_modes", "return_spring"]
 
@@ -36,7 +36,7 @@ def with_part(name: str) -> Machine:
 
 @pytest.mark.parametrize("name", EXACT)
 def test_halving_the_inner_step_changes_nothing(name: str) -> None:
-    """Less than a tenth of an encoder count over 2 s, so that no reading can tell; bristles are worst with 0.02 to 0.03 um.
+    """Less than a tenth of an encoder count over 2 s, so that it is not visible; bristles are worst with 0.02 to 0.03 um.
 
     Even backlash: its contacts are damped and located in time, so errors of rounding do not grow here.
     """
@@ -48,7 +48,7 @@ def test_halving_the_inner_step_changes_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXACT)
 def test_energy_never_appears(name: str) -> None:
-    """Stored energy less the motor's work falls at every sample, driven (0.5 s) and let go (0.5 s), but for rounding."""
+    """Stored energy minus the motor's work falls at every sample, driven (0.5 s) and free (0.5 s), except for rounding."""
     machine = with_part(name)
     u = 2.0 * np.random.default_rng(1).standard_normal((2000, 2))
     u[1000:] = 0.0
@@ -88,7 +88,7 @@ def linear_machine(kind: str) -> Machine:
 
 
 def exact_positions(truth: dict[str, Any], u: FloatArray, rate: float) -> FloatArray:
-    """Response of a transfer function with delay to held voltages, by matrix exponentials cut at the delayed instants."""
+    """Response of a transfer function with delay to held voltages, by matrix exponentials between the delayed times."""
     a, b, c, _ = tf2ss(truth["numerator"], truth["denominator"])
     scale = np.diag(300.0 ** np.arange(a.shape[0]))  # balances the companion form
     a, b, c = scale @ a @ np.linalg.inv(scale), scale @ b, c @ np.linalg.inv(scale)

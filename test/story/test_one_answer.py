@@ -1,4 +1,4 @@
-"""One recording, one answer: the command, the report and the page say the same of it, also where it has a gap."""
+"""One recording, one answer: command, report and page agree, also for a recording with a gap."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def rec(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def command(rec: Path) -> dict[str, Any]:
-    """What ``diagnose --json`` says."""
+    """The document of ``diagnose --json``."""
     found: dict[str, Any] = cli("diagnose", rec, "--json").json["axes"]["x"]
     return found
 
 
 def of_page(rec: Path, *acts: OrderKind) -> list[dict[str, Any]]:
-    """The stories that a page shows, one after the other."""
+    """The stories of a page, in sequence."""
     news: list[WorkerNews] = []
     desk = Desk(rec, Reading(), news.append)
     for number, act in enumerate(acts):
@@ -54,7 +54,7 @@ def of_page(rec: Path, *acts: OrderKind) -> list[dict[str, Any]]:
 
 
 def says_the_same(story: dict[str, Any], command: dict[str, Any]) -> bool:
-    """Words to the letter, numbers to the digits that a story has."""
+    """Assert equal words, and equal numbers to the digits of a story."""
     assert {name: story[name] for name in SAID} == {name: command[name] for name in SAID}
     for item, other in zip((story, *story["candidates"], *story["where"]), (command, *command["candidates"], *command["where"]), strict=True):
         numbers = {name: value for name, value in other.items() if isinstance(value, float) and name != "tolerance"}
@@ -67,7 +67,7 @@ def test_the_command_uses_both_stretches(command: dict[str, Any]) -> None:
 
 
 def test_the_page_says_what_the_command_says(rec: Path, command: dict[str, Any]) -> None:
-    """Of all stretches, as does the model that it ends with; its ladder never rises, and is that of ``refine --auto``."""
+    """The diagnosis and the final model use all stretches; the ladder never rises, and is that of ``refine --auto``."""
     story = of_page(rec, "diagnose", "auto")[-1]
     assert says_the_same(story, command)
     assert story["seconds"] == pytest.approx(24.0 - 0.75, abs=0.01)
@@ -79,14 +79,14 @@ def test_the_page_says_what_the_command_says(rec: Path, command: dict[str, Any])
 
 
 def test_the_report_says_what_the_command_says(rec: Path, command: dict[str, Any], tmp_path: Path) -> None:
-    """And tells the story of as many seconds."""
+    """The story has the same number of seconds."""
     story = cli("report", rec, "-o", tmp_path / "report.html", "--json").json["axes"]["x"]["story"]
     assert says_the_same(story, command)
     assert story["seconds"] == pytest.approx(24.0 - 0.75, abs=0.01)
 
 
 def test_what_is_left_out_is_said_everywhere(tmp_path: Path) -> None:
-    """Ends at which nothing drives the axis and it stands, and a stretch between gaps that is far shorter than the others."""
+    """Rests without a drive at both ends, and a stretch between gaps that is far shorter than the others."""
     whole = recorded("coulomb_friction", seconds=12.0)
     voltage, position = (
         np.concatenate([values, np.full(8000, last)]) for values, last in zip(whole.axis("x"), (0.0, whole.position[-1, 0]), strict=True)
@@ -108,7 +108,7 @@ def test_what_is_left_out_is_said_everywhere(tmp_path: Path) -> None:
 
 
 def test_one_move_tells_nothing_anywhere(tmp_path: Path) -> None:
-    """The command refuses it; the page and the report say why, in the same words, and name nothing."""
+    """The command refuses it; page and report give the same reason, and name no effect."""
     time = np.arange(3000) / 500.0
     way = 0.05 * np.clip((time - 2.0) / 2.0, 0.0, 1.0)
     position = way - 0.05 / (2.0 * np.pi) * np.sin(2.0 * np.pi * way / 0.05)
@@ -164,5 +164,5 @@ def test_backlash_that_is_asked_for_is_fitted_to_the_longest_stretch(loose: Path
 
 
 def test_where_nothing_is_left_no_backlash_is_missed(command: dict[str, Any]) -> None:
-    """The two effects leave the noise floor."""
+    """With the two effects the error is at the noise floor."""
     assert "not tried" not in command["sentence"]

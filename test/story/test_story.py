@@ -1,4 +1,4 @@
-"""One axis from the rigid base to the floor, step by step, without ROS: what a step holds, and what the document says."""
+"""One axis from the rigid base to the floor, step by step, without ROS: content of a step, and of the document."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_the_error_falls_from_the_base_to_the_floor() -> None:
 
 
 def test_a_whole_story_fits_its_base_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The rigid model from which the diagnosis begins is the one that the story shows."""
+    """The story shows the rigid model with which the diagnosis begins."""
     fitted: list[GreyboxFit] = []
 
     def counted(*given: Any) -> GreyboxFit:
@@ -50,14 +50,14 @@ def test_a_whole_story_fits_its_base_once(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_story_can_be_sent_to_another_process() -> None:
-    """It is plain: no compiled code in it, and little of it."""
+    """It is plain and small, without compiled code."""
     sent = pickle.dumps(told())
     assert document(pickle.loads(sent)) == document(told())
     assert len(sent) < 150_000
 
 
 def test_the_document_is_small_json_with_the_contracts_keys() -> None:
-    """Everything that diagnose --json says, the ladder, the model and pictures; no NaN; under 200 kB."""
+    """The content of diagnose --json, the ladder, the model and figure data; no NaN; under 200 kB."""
     text = json.dumps(document(told()), allow_nan=False)
     assert len(text) < 200_000
     made = json.loads(text)
@@ -78,7 +78,7 @@ def test_the_document_is_small_json_with_the_contracts_keys() -> None:
 
 
 def test_the_pictures_show_where_the_base_fails_and_that_it_no_longer_does() -> None:
-    """Measured and model agree within the band once the effect is in; friction's mean error has the sign of the motion."""
+    """Measurement and model agree within the band with the effect; friction's mean error has the sign of the motion."""
     made = document(told())
     shown, (first, last) = made["measured"], [step["pictures"] for step in made["steps"]]
     response = shown["frequency_response"]
@@ -102,7 +102,7 @@ def test_the_pictures_show_where_the_base_fails_and_that_it_no_longer_does() -> 
 
 
 def test_effects_come_and_go_by_name() -> None:
-    """One step each; what is not wanted is taken out first; next_best and auto find by themselves."""
+    """One step each; unwanted effects are removed first; next_best and auto find effects by themselves."""
     run = Run("x", RATE, *data())
     story = begin(run)
     wrong = with_effects(story, run, "cogging")
@@ -118,7 +118,7 @@ def test_effects_come_and_go_by_name() -> None:
 
 
 def test_what_the_diagnosis_has_searched_is_not_searched_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the last rung of the diagnosis nothing helps any more, and the answer comes without a fit."""
+    """At the last rung of the diagnosis no effect helps, and the answer needs no fit."""
     run = Run("x", RATE, *data())
     story = diagnosed(begin(run), run)
     assert story.diagnosis is not None
@@ -128,7 +128,7 @@ def test_what_the_diagnosis_has_searched_is_not_searched_again(monkeypatch: pyte
 
 
 def test_a_relative_replaces_its_own() -> None:
-    """Two laws of the same dry friction are not added to each other."""
+    """A second law of the same dry friction replaces the first."""
     story = added(told(), Run("x", RATE, *data()), "stribeck_friction")
     assert story.effects == ("stribeck_friction",)
     assert story.rungs[-1].label == "stribeck_friction instead of coulomb_friction"
@@ -144,11 +144,11 @@ def test_a_wrong_name_is_refused_in_one_line(name: str, words: str) -> None:
 
 
 def test_backlash_is_told_one_sample_ahead() -> None:
-    """What free simulation cannot judge: the label says so, and the pictures are those of the prediction."""
+    """For an effect that free simulation cannot judge, the label says so, and the figures are those of the prediction."""
     story = tell(recorded("x:backlash", seconds=20.0).run("x"))
     last, (first, *_, drawn) = story.rungs[-1], story.pictures
     assert (last.added, last.explained) == ("backlash", True)
-    assert first.failing and not drawn.failing  # explained is not drawn as failing
+    assert first.failing and not drawn.failing  # an explained model is not drawn as failing
     assert "one sample ahead" in last.label
     assert len(drawn.failing) < len(first.failing)
     error = np.std(drawn.zoom_velocity - (story.measured.zoom_velocity if story.measured else 0.0))
@@ -156,7 +156,7 @@ def test_backlash_is_told_one_sample_ahead() -> None:
 
 
 def test_without_enough_data_the_story_says_what_lacks() -> None:
-    """No steps, and a document all the same."""
+    """A document without steps."""
     story = tell(Run("x", RATE, np.ones(4000), np.zeros(4000)))
     made = document(story)
     assert made["verdict"] == "not_enough_data" and "the input does not move" in made["sentence"]
@@ -166,7 +166,7 @@ def test_without_enough_data_the_story_says_what_lacks() -> None:
 
 
 def test_the_linear_part_has_resonances_and_lags_and_leaves_friction_out() -> None:
-    """Roots where the parameters put them, gain at low frequency unchanged."""
+    """Roots as given by the parameters, gain at low frequency unchanged."""
     model = AxisModel(0.1, 1e-3, 200.0).with_effect("screw_compliance", (0.5, 100.0, 0.02, 0.03)).with_effect("amplifier_lag", (1e-3,))
     tf = linear_part(model.with_effect("coulomb_friction", (0.2,)).with_effect("backlash"))
     assert sorted(mode.frequency for mode in tf.zero_modes())[0] == pytest.approx(100.0, rel=1e-3)
@@ -180,7 +180,7 @@ def test_the_linear_part_has_resonances_and_lags_and_leaves_friction_out() -> No
 
 
 def test_every_noise_floor_of_a_story_is_of_its_own_tolerance() -> None:
-    """A model may leave 2 % of the motion: the diagnosis, its ladder, the steps and the pictures have one floor, well above the encoder's noise."""
+    """With a tolerance of 2 % of the motion, the diagnosis, its ladder, the steps and the figures have one floor, well above encoder noise."""
     run = Run("x", RATE, *data())
     story = next_best(diagnosed(begin(run, tolerance=0.02), run), run)
     assert story.diagnosis is not None

@@ -1,4 +1,4 @@
-"""Short step and ramp tests: first order with delay and friction, and what they do not tell."""
+"""Short step and ramp tests: first order with delay and friction, and undetermined quantities."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FINE = 50  # steps of the machine in a sample
 
 
 def moved(u: FloatArray, friction: float = FRICTION, seed: int = 1) -> Run:
-    """A first-order axis with friction, in steps of Euler's, and the noise of a tachometer."""
+    """A first-order axis with friction, by Euler steps, and tachometer noise."""
     late, v, speeds = int(DELAY * RATE * FINE), 0.0, []
     held = np.concatenate((np.full(late, u[0]), np.repeat(u, FINE)))
     for n in range(len(u)):
@@ -36,7 +36,7 @@ def moved(u: FloatArray, friction: float = FRICTION, seed: int = 1) -> Run:
 
 
 def both_ways() -> list[Run]:
-    """Ramp and step, there and back, as robot builders do it: four short recordings."""
+    """Ramp and step, both ways, as robot builders do it: four short recordings."""
     ramp = np.linspace(0.0, 6.0, 600)
     step = np.concatenate((np.zeros(20), np.full(160, 5.0)))
     return [moved(u, seed=k) for k, u in enumerate((ramp, -ramp, step, -step))]
@@ -54,7 +54,7 @@ def test_ramps_and_steps_both_ways_tell_friction_gain_and_time_constant() -> Non
 
 
 def test_one_level_in_one_direction_does_not_tell_the_friction() -> None:
-    """From rest by one step the speed is gain (u - friction): the answer says so instead of a number."""
+    """With one step from rest only gain (u - friction) is determined: the answer says so instead of a number."""
     found = first_order([moved(np.concatenate((np.zeros(20), np.full(200, 5.0))))])
     assert "friction" not in [item.name for item in found.quantities]
     assert any("friction" in sentence and "distinguished" in sentence for sentence in first_order_words(found))
@@ -62,20 +62,20 @@ def test_one_level_in_one_direction_does_not_tell_the_friction() -> None:
 
 
 def test_a_level_that_ends_too_soon_is_extrapolated_and_that_is_said() -> None:
-    """The step lasts less than the three time constants that a first order takes."""
+    """The step is shorter than the three time constants that a first order needs."""
     found = first_order([moved(np.concatenate((np.zeros(10), np.full(24, 5.0))), 0.0)])
     assert any("extrapolated" in sentence for sentence in first_order_words(found))
 
 
 def test_an_input_that_never_changes_is_refused() -> None:
-    """Nothing is told by it."""
+    """It determines nothing."""
     run = moved(np.zeros(100))
     with pytest.raises(BadInput, match="one and the same"):
         first_order([run])
 
 
 def test_a_delay_that_no_step_shows_is_unknown_and_within_what_was_looked_for() -> None:
-    """Levels that change between recordings only: gain is told, the delay is any up to half of a recording, and the answer says so."""
+    """Levels that change only between recordings: the gain is determined, the delay is not, and the answer says so."""
     found = first_order([moved(np.full(200, level), 0.0, seed=k) for k, level in enumerate((5.0, -5.0, 2.0))])
     assert found["gain"].value == pytest.approx(GAIN, rel=0.05)
     assert found["delay"].low >= 0.0 and found["delay"].high <= 0.5 * 200 / RATE

@@ -17,7 +17,7 @@ RATE, STIFFNESS, DAMPING, FRICTION, LIMIT, DELAY = 100.0, 900.0, 40.0, 4.0, 60.0
 
 
 def followed(target: FloatArray, limit: float, seed: int) -> Run:
-    """A joint behind its controller, in steps of 20 us, with an encoder of 1 mrad."""
+    """A joint with its controller, in steps of 20 us, with an encoder of 1 mrad."""
     steps = 500
     q, v, late, angles = 0.0, 0.0, round(DELAY * RATE * steps), []
     held = np.concatenate((np.zeros(late), np.repeat(target, steps)))
@@ -35,7 +35,7 @@ def followed(target: FloatArray, limit: float, seed: int) -> Run:
 
 @pytest.fixture(scope="module")
 def runs() -> list[Run]:
-    """Eight short recordings: steps, ramps and chirps of several sizes, the large ones at the torque's limit."""
+    """Eight short recordings: steps, ramps and chirps of several sizes, the large ones at the torque limit."""
     t = np.arange(90) / RATE
     targets = [size * np.sign(np.sin(7.0 * t + size)) for size in (0.05, 0.2, 0.6, 0.8)]
     targets += [size * np.sin(2 * np.pi * (0.5 + 2.5 * t) * t) for size in (0.1, 0.3, 0.5)] + [0.4 * t]
@@ -43,7 +43,7 @@ def runs() -> list[Run]:
 
 
 def test_short_recordings_together_tell_controller_friction_limit_and_delay(runs: list[Run]) -> None:
-    """Every number over the inertia within ten per cent; the simulation of recordings that no fit saw is nearly right."""
+    """Every number over the inertia within 10 %; the simulation of held-out recordings is nearly right."""
     found = servo(runs)
     for name, true in (("stiffness", STIFFNESS), ("damping", DAMPING), ("friction", FRICTION), ("limit", LIMIT)):
         assert found[name].value == pytest.approx(true, rel=0.1), name
@@ -52,7 +52,7 @@ def test_short_recordings_together_tell_controller_friction_limit_and_delay(runs
 
 
 def test_what_target_and_angle_cannot_tell_is_said(runs: list[Run]) -> None:
-    """Without an inertia there are ratios only; with one, MuJoCo's numbers in SI."""
+    """Without an inertia there are only ratios; with one, MuJoCo's numbers in SI."""
     found = servo(runs)
     assert any("determine only ratios to the inertia" in text for text in servo_words(found, None))
     assert any("derivative gain" in text for text in servo_words(found, 0.01))
@@ -62,7 +62,7 @@ def test_what_target_and_angle_cannot_tell_is_said(runs: list[Run]) -> None:
 
 
 def test_a_limit_that_is_never_reached_is_not_told(runs: list[Run]) -> None:
-    """Small motions: the answer is a bound, and how to get a number."""
+    """Small motions: the answer is a bound, and a test that would give a number."""
     small = [followed(0.03 * run.voltage, 1e9, k) for k, run in enumerate(runs[2:5])]
     found = servo(small)
     assert "limit" not in [item.name for item in found.quantities]
@@ -76,7 +76,7 @@ def test_a_voltage_is_no_target(runs: list[Run]) -> None:
 
 
 def test_96_short_recordings_of_a_hobby_servo_are_used_together() -> None:
-    """Each has 150 samples at most; the simulation from the target alone explains most of what no fit saw."""
+    """Each has at most 150 samples; the simulation from the target alone explains most of the held-out data."""
     said = ("--map", "input=data[*].actions,output=data[*].sensor_data", "--rate", "50", "--unit", "input=rad,output=rad", "--json")
     found = cli("servo", data("servo_target/response.json"), *said, "--inertia", "0.002").json["axes"]["x"]
     assert found["recordings"] > 60 and found["explained"] > 0.95

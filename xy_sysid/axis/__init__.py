@@ -3,7 +3,7 @@
 model:         gain, delay, pole, the values of the effects; its simulation
 resonant_loop: resonances inside the loop
 interpolation: the axis's position between two encoder samples
-loop_template: the frame of the simulation loop
+loop_template: template of the simulation loop
 loop_source:   source text of one loop, generated from the laws of a set of effects
 loop_compile:  from that text to machine code, cached on disk
 linear_part:   the linear part as a transfer function

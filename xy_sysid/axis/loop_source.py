@@ -38,8 +38,8 @@ def text(name: str, effects: Sequence[Effect]) -> str:
 def moving(name: str, effects: Sequence[Effect]) -> str:
     """Source of ``name(u, x, p, on, fs, fine, start, out, centring, most, ago, sent)``: an axis whose position follows from its simulated motion.
 
-    As ``text``, but x: (n + 1,) its first value is the place at the start, and the rest receives the place of the axis, m; u: (n,) the voltage
-    wanted, V; centring: (n,) V/m back to the start, of the place ``ago`` samples ago; most: V; sent: (n,) receives the voltage applied, V.
+    As ``text``, but x: (n + 1,) m, its first value is the start position, and the others receive the position of the axis; u: (n,) the wanted
+    voltage, V; centring: (n,) V/m towards the start, for the position ``ago`` samples ago; most: V; sent: (n,) receives the applied voltage, V.
     """
     own = {
         "more": ", centring, most, ago, sent",
@@ -272,7 +272,7 @@ def _bristle(effects: Sequence[Effect], hung: bool) -> str:
 
 
 def _hang(effects: Sequence[Effect]) -> str:
-    """The resonances as polynomials, 1 at 0 Hz; one without roots in s filters the sampled motion instead."""
+    """The resonances as polynomials with gain 1 at 0 Hz; a section without roots in s filters the sampled motion instead."""
     lines = []
     for effect in _of(effects, "motion"):
         lines += [
@@ -305,7 +305,7 @@ def _motions(effects: Sequence[Effect]) -> str:
 
 
 def _motions_taken_back(effects: Sequence[Effect]) -> str:
-    """The inverse of the same sections: their zeros are damped, so that the result does not grow."""
+    """The inverse of the same sections: their zeros are damped, so the inverse is stable."""
     lines = []
     for effect in _of(effects, "motion"):
         lines += [

@@ -1,10 +1,10 @@
-"""The frame of the loop, into which ``loop_source`` inserts the laws of the effects.
+"""Template of the loop, into which ``loop_source`` inserts the laws of the effects.
 
 Three paths: forces that are constant or linear in speed between switching instants, exactly; laws that
 are nonlinear in speed, in sub-steps; and an axis with resonances (``resonant_loop``), exactly, and in sub-steps where
 laws depend on speed.
 ``more``, ``begins`` and ``ends`` hold the code for an axis whose position is simulated, not measured.
-The second frame removes effects from a recording, for those that only one-step prediction can judge.
+The second template removes effects from a recording, for one-step prediction of other effects.
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def drive_from(kt: float | None, gear: str, units: Units) -> Transmission:
 def mechanics(figures: Iterable[Figure], units: Units, drive: Transmission) -> tuple[Mechanical, ...]:
     """Gain, pole (or time constant) and friction in SI; empty unless the input is a force, a torque or a current with a known constant.
 
-    figures: gain, pole or time_constant, and parameters in the unit of the input. Intervals take gain and pole as independent, which makes
+    figures: gain, pole or time_constant, and parameters in the unit of the input. Intervals assume independent gain and pole, which makes
     those of the inertia too wide rather than too narrow.
     """
     linear, factor = units.output == "m", _factor(units, drive)

@@ -3,9 +3,9 @@
 The velocity is simulated from the initial speed of the measured position. Laws that depend on position use the
 measured one, so that there is no drift. Scheme:
 each sample is split where the delayed voltage changes. In between, the viscous pole is integrated exactly for a constant
-force, and the zero crossings of dry friction are found in time (Karnopp 1985's problem without his dead band). Laws that are
+force, and the zero crossings of dry friction are located in time (Karnopp 1985's problem without his dead band). Laws that are
 nonlinear in speed get sub-steps (two in each piece at 2 kHz), by the midpoint rule. Resonances filter the sampled motion, unless
-a law depends on speed: then they are in the loop with it (``resonant_loop``), with the same parameters and the same linear limit.
+a law depends on speed: then they are in the loop with it (``resonant_loop``), with the same parameters and the same linear response.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from xy_sysid.settings import unknown_name
 FINE = 16000.0  # Hz: sub-steps; LuGre bristles of 10 um and Stribeck curves of 10 mm/s need it
 FADED = 3.0  # time constants after which a wrong start speed has decayed (5 %)
 SURE = 3.0  # times its standard deviation: a larger error of the start speed is corrected
-ROUNDS = 4  # correction rounds: friction makes nonlinear what is linear in a rigid axis
+ROUNDS = 4  # correction rounds: friction makes the problem nonlinear
 
 
 class Library:

@@ -10,7 +10,7 @@ import numpy as np
 from xy_sysid.samples.block import FloatArray
 
 SHORTEST = 8  # least samples for a parabola and its residual
-LONGEST = 0.2  # s of the start that are used at most
+LONGEST = 0.2  # s, longest part of the start that is used
 
 
 def start_speed(sampling_rate: float, position: FloatArray) -> tuple[float, float]:

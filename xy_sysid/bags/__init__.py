@@ -1,14 +1,14 @@
-"""rosbag2 in and out: messages --> proof of layout --> blocks, and blocks --> a bag that survives its recorder.
+"""Reading and writing of rosbag2: messages --> check of their layout --> blocks, and blocks --> a bag that is complete even after a crash.
 
-reading:                               a recording as a whole: its files, topics, messages
-sqlite_file, pages:                    a .db3, by SQL or straight from its pages
+reading:                               a full recording: its files, topics, messages
+sqlite_file, pages:                    a .db3, by SQL or directly from its pages
 mcap_file, mcap_records, compression, checksum: an .mcap, its records and its chunks
-sums:                                  check sums for what has none of its own
-opening:                               what is looked at before a file is opened
-atomic:                                files that are written whole or not at all
-cdr, stride:                           proof of layout, then arrays without deserializing each
+sums:                                  checksums for .db3 files, which have none of their own
+opening:                               checks before a file is opened
+atomic:                                files that are written completely or not at all
+cdr, stride:                           check of the layout, then arrays without deserializing each message
 streaming:                             blocks of voltage and position in log order
-writing:                               a bag that is complete at any moment, and the definitions that it carries
+writing:                               a bag that is complete at any moment, and its message definitions
 sqlite_writer, mcap_writer:            its files
 """
 
@@ -29,7 +29,7 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
-    """Each name when it is first used: who writes a file or a bag need not wait for the compiler of the readers."""
+    """Import each name at its first use, so that writing a file or a bag need not wait for the compiler of the readers."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     found = getattr(importlib.import_module(f"xy_sysid.bags.{_HOME[name]}"), name)

@@ -1,7 +1,7 @@
-"""Files are written whole or not at all: a full disk, Ctrl-C or a lost supply leaves what was there before, and no stump.
+"""Files are written completely or not at all: after a full disk, Ctrl-C or a power failure the old file remains, and no partial one.
 
-What is written stands in a hidden folder beside its place until it is complete. Its writer holds a lock on that folder, which
-the system releases when the writer ends, however it ends: after kill -9 the next writer finds the folder unlocked and removes it.
+A new file is in a hidden folder next to its place until it is complete. The writer holds a lock on that folder, which
+the system always releases when the writer ends: after kill -9 the next writer finds the folder unlocked and removes it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from xy_sysid.errors import BadRecording
 
-PART = ".xy_part_"  # begins the hidden folder beside the file; only kill -9 and a lost supply leave one behind, until the next writer comes
+PART = ".xy_part_"  # prefix of the hidden folder; after kill -9 or a power failure it remains until the next writer removes it
 OF_A_WRITER = re.compile(re.escape(PART) + "[0-9a-f]{16}")
 DIRECTORY = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
 STREAMS = ("/dev/stdout", "/dev/stderr", "/dev/fd/", "/proc/")
@@ -26,10 +26,10 @@ STREAMS = ("/dev/stdout", "/dev/stderr", "/dev/fd/", "/proc/")
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """Where to write instead; it becomes ``path`` once it is complete and on the disk, and is gone if anything goes wrong.
+    """A temporary path to write to; it becomes ``path`` once it is complete and on the disk, and is removed after an error.
 
-    What is written may be a file, or a folder where there is none yet. The name stays the same, the folder is another. A
-    link is followed, a file keeps its mode, and what is no file (a pipe, a terminal) is written to as it is.
+    Write a file there, or a folder if ``path`` does not exist yet. The temporary path has the same name in another folder. A
+    link is followed, a file keeps its mode, and a pipe or a terminal is written to directly.
     Raises BadRecording, one line that names ``path``, if it cannot be written.
     """
     try:
@@ -47,25 +47,25 @@ def whole(path: Path) -> Iterator[Path]:
                 flushed(part)
                 part.replace(target)
                 _sync(target.parent)
-    except (OSError, sqlite3.Error) as problem:  # sqlite's own words for a full disk
+    except (OSError, sqlite3.Error) as problem:  # sqlite reports a full disk with its own error
         why = f"cannot be written ({getattr(problem, 'strerror', None) or problem})"
         raise BadRecording(path, why, "Make room on the disk, or choose another place; what was there is untouched.") from None
-    except BadRecording as problem:  # of a writer, which knows the other place only
+    except BadRecording as problem:  # of a writer, which names the temporary path
         raise BadRecording(path, problem.problem, problem.act) from None
 
 
 @contextmanager
 def _folder(beside: Path) -> Iterator[Path]:
-    """A new hidden folder that is locked as long as its writer lives, and gone at the end."""
+    """A new hidden folder that is locked while its writer runs, and removed at the end."""
     with ExitStack() as stack:
         while True:
             folder = beside / f"{PART}{secrets.token_hex(8)}"
-            stack.callback(shutil.rmtree, folder, ignore_errors=True)  # before it is there: a signal at any moment finds what to remove
+            stack.callback(shutil.rmtree, folder, ignore_errors=True)  # before it is created, so that it is removed after a signal at any moment
             folder.mkdir(0o700)
             try:
                 handle = os.open(folder, DIRECTORY)
             except FileNotFoundError:
-                continue  # another writer saw it before it was locked, and removed it
+                continue  # another writer removed it before it was locked
             stack.callback(os.close, handle)
             _locked(handle, fcntl.LOCK_EX)
             if folder.exists():
@@ -74,7 +74,7 @@ def _folder(beside: Path) -> Iterator[Path]:
 
 
 def _remove_abandoned(place: Path) -> None:
-    """Remove the hidden folders of writers that are dead; those of the living are locked, and other users' cannot be opened."""
+    """Remove the hidden folders of writers that have ended; those in use are locked, and those of other users cannot be opened."""
     with os.scandir(place) as items:
         found = [place / item.name for item in items if OF_A_WRITER.fullmatch(item.name) and item.is_dir(follow_symlinks=False)]
     for folder in found:
@@ -86,7 +86,7 @@ def _remove_abandoned(place: Path) -> None:
 
 
 def _locked(handle: int, way: int) -> bool:
-    """False where another holds the lock, or on a file system that has none: then nothing is ever removed there."""
+    """False if another process holds the lock, or on a file system without locks, where nothing is ever removed."""
     try:
         fcntl.flock(handle, way)
     except OSError:
@@ -95,13 +95,13 @@ def _locked(handle: int, way: int) -> bool:
 
 
 def write_text(path: Path, text: str) -> None:
-    """A text file, whole or not at all. Raises BadRecording."""
+    """Write a text file, completely or not at all. Raises BadRecording."""
     with whole(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
 def flushed(path: Path) -> None:
-    """Wait until a file, or a folder with all that is in it, is on the disk. Raises OSError."""
+    """Wait until a file, or a folder with all its files, is on the disk. Raises OSError."""
     if path.is_dir():
         for item in path.iterdir():
             flushed(item)
@@ -117,7 +117,7 @@ def _sync(path: Path) -> None:
 
 
 def taken(path: Path) -> bool:
-    """Whether writing there would replace something: a file, a folder, or a link, even one that leads nowhere. A pipe loses nothing."""
+    """True if writing there would replace a file, a folder, or a link, even a broken one; False for a pipe."""
     return os.path.lexists(path) and not _stream(path)
 
 

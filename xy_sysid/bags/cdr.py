@@ -1,7 +1,7 @@
-"""Where the numbers sit in a serialized message (CDR, the encoding of ROS 2), and which bytes prove it.
+"""Offsets of the numbers in a serialized message (CDR, the encoding of ROS 2), and the bytes that prove them.
 
-A ``Layout`` is read off one message. Any other message with the same length and the same fixed bytes (labels, sizes,
-names, but neither stamps, numbers nor padding, which is uninitialised memory) has its numbers at the same offsets.
+A ``Layout`` is read from one message. Any other message with the same length and the same fixed bytes (labels, sizes,
+names; not stamps, numbers or padding, which is uninitialised memory) has its numbers at the same offsets.
 Source: OMG DDSI-RTPS 2.5, section 10 (encapsulation), and DDS-XTypes 1.3, 7.4.1 (plain CDR).
 """
 
@@ -24,7 +24,7 @@ BIG, LITTLE = 0, 1
 
 
 class Unreadable(ValueError):
-    """The bytes are not a message of the type that was expected."""
+    """The bytes are not a message of the expected type."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,8 @@ class Layout:
     """The shape shared by all messages whose fixed bytes are equal.
 
     size:     length of the message in bytes
-    template: (size,) the message that the layout was read off
-    fixed:    (size,) 255 where a byte must equal the template, else 0
+    template: (size,) the message from which the layout was read
+    fixed:    (size,) 255 for a byte that must equal the template, otherwise 0
     order:    "<" or ">", byte order of the numbers
     names:    the dimension labels of an array, or the joint names
     shape:    the dimension sizes of an array, empty for a joint state
@@ -52,7 +52,7 @@ class Layout:
 
 
 class _Cursor:
-    """Walks over one message and remembers which bytes are structure."""
+    """Reads one message and records which bytes are structure."""
 
     def __init__(self, message: bytes) -> None:
         if len(message) < 4 or message[0] != 0 or message[1] not in (BIG, LITTLE):
@@ -74,7 +74,7 @@ class _Cursor:
         return start
 
     def count(self, each: int) -> int:
-        """A uint32 that says how many items of at least ``each`` bytes follow."""
+        """A uint32: the number of items of at least ``each`` bytes that follow. Raises Unreadable if the message is too short for them."""
         self.align(4)
         number = int(struct.unpack_from(self.order + "I", self.message, self.take(4, True))[0])
         if number * each > len(self.message) - self.at:

@@ -1,4 +1,4 @@
-"""CRC-32 of the chunks of an MCAP file: Intel's where it is installed, a tenth of zlib's time; zlib's is half of reading a file."""
+"""CRC-32 of the chunks of an MCAP file: Intel's if installed, in a tenth of zlib's time, which is half of the time to read a file."""
 
 from __future__ import annotations
 

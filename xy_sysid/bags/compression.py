@@ -1,4 +1,4 @@
-"""zstd and lz4, as bags use them; both libraries come with rosbags. Nothing is unpacked further than it may become."""
+"""Decompression of zstd and lz4, up to a maximum size; both libraries come with rosbags."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from xy_sysid.bags.stride import Batch
 from xy_sysid.errors import BadRecording
 
 MESSAGE = 1 << 26  # bytes; no message of a bag is longer
-SWOLLEN = 200  # times its size; no file of samples shrinks further
-LEAST = 1 << 26  # bytes that any file may become
+SWOLLEN = 200  # largest ratio of decompressed to compressed size; no file of samples has a larger one
+LEAST = 1 << 26  # bytes; decompressed size that is allowed for any file
 PIECE = 1 << 20  # bytes written at once
-FREE = 0.5  # of the space that is left for temporary files
+FREE = 0.5  # largest used fraction of the free space for temporary files
 
 
 class Damaged(ValueError):
@@ -43,7 +43,7 @@ def _errors(module: ModuleType) -> tuple[type[Exception], ...]:
 
 
 def decompressor(method: str, path: Path) -> Callable[[bytes, int], bytes]:
-    """The function that undoes ``method`` ("zstd" or "lz4") up to a number of bytes, or raises Damaged; raises BadRecording for another one."""
+    """A function that decompresses ``method`` ("zstd" or "lz4") up to a number of bytes, or raises Damaged. Raises BadRecording for other methods."""
     module = _module(method, path)
     begin: Callable[[], Any] = module.LZ4FrameDecompressor if method == "lz4" else module.ZstdDecompressor
 
@@ -66,7 +66,7 @@ def decompressor(method: str, path: Path) -> Callable[[bytes, int], bytes]:
 
 
 def unpacked(batch: Batch, undo: Callable[[bytes, int], bytes]) -> tuple[Batch, int]:
-    """Messages that were compressed one by one, without those that are damaged, and how many these are."""
+    """Individually compressed messages, decompressed, without the damaged ones, and the number of these."""
     found: list[bytes] = []
     kept: list[int] = []
     for place, (start, length) in enumerate(zip(batch.start.tolist(), batch.length.tolist(), strict=True)):
@@ -84,7 +84,7 @@ def unpacked(batch: Batch, undo: Callable[[bytes, int], bytes]) -> tuple[Batch, 
 def whole_ones(
     batches: Iterator[tuple[Batch, float]], undo: Callable[[bytes, int], bytes] | None, name: str, notes: list[str]
 ) -> Iterator[tuple[Batch, float]]:
-    """The batches of a file, unpacked where its messages are compressed; a note says how many were damaged."""
+    """The batches of a file, decompressed if its messages are; a note gives the number of damaged messages."""
     bad = 0
     for batch, part in batches:
         if undo is not None:
@@ -96,7 +96,7 @@ def whole_ones(
 
 
 def expand(source: Path, target: Path, method: str) -> None:
-    """Write a compressed file out; raises BadRecording, too if it becomes larger than any recording."""
+    """Decompress a file; raises BadRecording if it is damaged, or becomes larger than a recording can be."""
     module = _module(method, source)
     most = min(max(SWOLLEN * source.stat().st_size, LEAST), int(FREE * shutil.disk_usage(target.parent).free))
     size = 0

@@ -1,6 +1,6 @@
-"""An MCAP file: which topics it has, and its messages in the order in which they were logged.
+"""An MCAP file: its topics, and its messages in log order.
 
-Read from the front, chunk after chunk, without the index at the end: so a file that was cut short gives what it has.
+It is read from the start, chunk by chunk, without the index at the end, so that a truncated file gives the messages that it has.
 Source: mcap.dev/spec (records Header 1, Footer 2, Schema 3, Channel 4, Message 5, Chunk 6, Statistics 11, DataEnd 15).
 """
 
@@ -21,19 +21,19 @@ from xy_sysid.bags.stride import Batch, Indices
 from xy_sysid.errors import BadRecording
 from xy_sysid.jit import compiled
 
-WINDOW = 1 << 20  # bytes read at once where messages are not in chunks
-LARGEST = 1 << 31  # bytes; a record that claims to be longer is damage
-BECOMES = 1 << 28  # bytes; a chunk that becomes longer is damage, or made to fill the memory
-ROWS, BYTES = 4096, 1 << 20  # messages given on at once, and where they may end: they stay in the cache of the processor
+WINDOW = 1 << 20  # bytes read at once if messages are not in chunks
+LARGEST = 1 << 31  # bytes; a record with a larger length is damaged
+BECOMES = 1 << 28  # bytes; a chunk with a larger decompressed size is damaged, or made to fill the memory
+ROWS, BYTES = 4096, 1 << 20  # messages, and bytes, in a batch: it stays in the cache of the processor
 
 
 @compiled
 def messages(data: Bytes, at: int, topics: Indices, rows: Indices) -> tuple[int, int]:
-    """Walk over records from ``at`` while they are messages.
+    """Read records from ``at`` while they are messages.
 
-    topics: index of the topic by channel, -1 where it is not wanted, as those after the last
-    rows:   out, one per message that is wanted: topic, log time, start, length
-    Returns how many, and where the walk stopped: at another record, at an incomplete one, after BYTES, or because ``rows`` is full.
+    topics: index of the topic by channel, -1 for unwanted ones; channels after the last are unwanted
+    rows:   output, one per wanted message: topic, log time, start, length
+    Returns the number of wanted messages, and the offset of the end: another record, an incomplete one, after BYTES, or ``rows`` full.
     """
     found, size, enough = 0, data.shape[0], at + BYTES
     while at + 9 <= size and at < enough and data[at] == 5 and found < rows.shape[0]:
@@ -76,7 +76,7 @@ class McapFile:
             if os.pread(self.handle, 8, 0) != MAGIC:
                 raise BadRecording(path, "not an MCAP file (its first bytes are wrong)", "Give a bag that ros2 or xy-sysid recorded.")
             if not self._summary():
-                for _ in self._chunks([]):  # no index at the end: learn the topics by walking through
+                for _ in self._chunks([]):  # no index at the end: read all chunks for the topics
                     pass
                 if not self.damage and os.pread(self.handle, 8, max(0, self.size - 8)) != MAGIC:
                     self.damage = "cut short"
@@ -93,7 +93,7 @@ class McapFile:
         os.close(self.handle)
 
     def _summary(self) -> bool:
-        """Learn the topics from the index at the end; False if there is none."""
+        """Read the topics from the index at the end; False if there is none."""
         tail = os.pread(self.handle, 37, max(0, self.size - 37))
         if len(tail) < 37 or tail[-8:] != MAGIC or tail[0] != FOOTER:
             return False
@@ -118,7 +118,7 @@ class McapFile:
             self.damage = "a record is damaged"
 
     def batches(self, wanted: Sequence[str], unpack: Callable[[bytes, int], bytes] | None) -> Iterator[tuple[Batch, float]]:
-        """Messages of these topics in log order, with the part of the file that has been read."""
+        """Messages of these topics in log order, with the fraction of the file that has been read."""
         self.chunks = {}
         yield from whole_ones(self._chunks(wanted), unpack, self.path.name, self.notes)
         for why, count in self.chunks.items():
@@ -153,7 +153,7 @@ class McapFile:
             self.damage = self.damage or "cut short"
 
     def _read(self, length: int, at: int) -> memoryview:
-        """Bytes of the file, in memory that the next call uses again: fresh memory for each chunk costs as much as reading it."""
+        """Bytes of the file, in memory that the next call reuses: new memory for each chunk takes as long as reading it."""
         length = max(0, min(length, self.size - at))
         if self._memory.size < length:
             self._memory = np.empty(length, np.uint8)
@@ -195,7 +195,7 @@ class McapFile:
         self.chunks[why] = self.chunks.get(why, 0) + 1
 
     def _walk(self, data: Bytes, at: int, wanted: Sequence[str], place: int) -> Generator[tuple[Batch, float], None, int]:
-        """Yield the messages from ``at`` on; the value of the generator is how many bytes they take."""
+        """Yield the messages from ``at`` on; the generator returns their number of bytes."""
         rows = np.empty((ROWS, 4), np.int64)
         start = at
         topics = np.full(max([*self.channels, 0]) + 1, -1, np.int64)

@@ -1,4 +1,4 @@
-"""How an MCAP file and its records begin. Source: mcap.dev/spec."""
+"""Start of an MCAP file, and of its records. Source: mcap.dev/spec."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Writes one MCAP file that is valid after every flush: the end mark is written each time, and overwritten by the next.
+"""Writes one MCAP file that is valid after every flush: each flush writes the end mark, and overwrites the previous one.
 
-Source: mcap.dev/spec. The index at the end is written on close; without it a reader scans.
+Source: mcap.dev/spec. The index at the end is written on close; without it a reader reads the whole file.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class McapWriter:
         self.at += len(data)
 
     def _sync(self) -> None:
-        """Wait for the disk: what was flushed outlives a lost supply, and not a killed recorder alone."""
+        """Wait for the disk: flushed data survive a power failure, not only the end of the recorder."""
         try:
             os.fdatasync(self.file.fileno())
         except OSError as error:

@@ -10,14 +10,14 @@ import yaml
 
 from xy_sysid.errors import BadRecording
 
-LONGEST = 1 << 20  # bytes of a text that people or the commands write: a model, parameters, a run file
-WORDS = 20_000  # parts of a YAML document of that kind, each repeated part counted as often as it stands there
+LONGEST = 1 << 20  # bytes of a text by people or the commands: a model, parameters, a run file
+WORDS = 20_000  # parts of such a YAML document; repeated parts (aliases) count each time
 DEEPEST = 30  # levels of a YAML document
-PARSER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the compiled one where there is one
+PARSER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the compiled one if available
 
 
 def regular_file(path: Path) -> None:
-    """Raises BadRecording for a pipe, a device, a socket or a folder, which may never end; OSError where there is nothing."""
+    """Raises BadRecording for a pipe, a device, a socket (reading may never end) or a folder; OSError if it does not exist."""
     if not stat.S_ISREG(path.stat().st_mode):
         raise BadRecording(path, "not a file but a pipe, a device, a socket or a folder", "Copy its content into a file first.")
 
@@ -26,7 +26,7 @@ def text_of(path: Path, what: str, most: int = LONGEST) -> str:
     """The text of a file in UTF-8.
 
     what: kind of file, for the message; most: bytes
-    Raises BadRecording in one line if it is no file, longer, not readable, or not text.
+    Raises BadRecording in one line if it is not a regular file, longer, not readable, or not text.
     """
     try:
         regular_file(path)
@@ -41,10 +41,10 @@ def text_of(path: Path, what: str, most: int = LONGEST) -> str:
 
 
 def yaml_of(path: Path, what: str, most: int = LONGEST) -> Any:
-    """The document of a YAML file that people write.
+    """The document of a YAML file by people.
 
     what: kind of file, for the message; most: bytes
-    Raises BadRecording in one line as ``text_of``, and for what is no YAML or repeats itself to more than anybody writes.
+    Raises BadRecording in one line as ``text_of``, and for invalid YAML or a document that is too long (see ``too_much``).
     """
     text = text_of(path, what, most)
     try:
@@ -58,15 +58,15 @@ def yaml_of(path: Path, what: str, most: int = LONGEST) -> Any:
 
 
 def too_much(text: str, most: int = WORDS) -> str:
-    """Why a YAML text is not to be read: it is longer or deeper than anybody writes it, or repeats itself to that length. Empty if it may be read.
+    """Reason not to read a YAML text: it has too many parts, also by aliases, or too many levels. Empty if it may be read.
 
-    most: parts. Raises yaml.YAMLError for what is no YAML.
+    most: parts. Raises yaml.YAMLError for invalid YAML.
     """
     parts, inside = 0, list[tuple[str | None, int]]()
-    known: dict[str, int] = {}  # parts of what an anchor names
+    known: dict[str, int] = {}  # number of parts by anchor
     for event in yaml.parse(text, Loader=PARSER):
         if isinstance(event, yaml.AliasEvent):
-            parts += known.get(event.anchor or "", most + 1)  # what repeats itself within itself never ends
+            parts += known.get(event.anchor or "", most + 1)  # an alias within its own anchor never ends
         elif isinstance(event, yaml.CollectionStartEvent):
             inside.append((event.anchor, parts))
             parts += 1

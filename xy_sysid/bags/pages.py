@@ -1,7 +1,7 @@
-"""The messages of a rosbag2 sqlite3 file, taken straight from its pages.
+"""The messages of a rosbag2 sqlite3 file, read directly from its pages.
 
-SQL hands over one Python tuple per row; walking the table's B-tree in compiled code gives the same bytes ten times
-faster, and what can be read of a damaged file. Source: sqlite.org/fileformat2.html, sections 1.5 and 1.6.
+SQL returns one Python tuple per row; reading the table's B-tree in compiled code gives the same bytes ten times
+faster, and also the readable part of a damaged file. Source: sqlite.org/fileformat2.html, sections 1.5 and 1.6.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ INTERIOR, LEAF = 5, 13
 SPAN = 1 << 20  # bytes read at once: stays in the cache of the processor
 WIDTHS = np.array([0, 1, 2, 3, 4, 6, 8, 0, 0, 0])  # bytes of an integer column, by serial type
 GROUP = 4096  # leaf pages listed at once
-ROWS = 4096  # messages found at once; more where they are small
-DEEPEST = 20  # levels; a B-tree of pages that is deeper is damaged
-WIDEST = 1 << 26  # bytes; one leaf with longer chains of overflow than this is read by SQL
+ROWS = 4096  # messages found at once; more if they are small
+DEEPEST = 20  # levels; a deeper B-tree is damaged
+WIDEST = 1 << 26  # bytes; a leaf with overflow pages further away is read by SQL
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ def open_pages(handle: int) -> PageFile:
 
 
 def _children(file: PageFile, number: int) -> NDArray[np.int64] | None:
-    """Pages below an interior page, in row order; None for a leaf. A page that is neither has none."""
+    """Pages below an interior page, in row order; None for a leaf; empty for a page that is neither."""
     page = os.pread(file.handle, file.size, (number - 1) * file.size)
     if len(page) < file.size:
         return np.empty(0, np.int64)
@@ -71,14 +71,14 @@ def _children(file: PageFile, number: int) -> NDArray[np.int64] | None:
 
 
 def leaves(file: PageFile, root: int) -> Iterator[NDArray[np.int64]]:
-    """Numbers of the leaf pages in row order, many at a time; a number outside the file stands for a lost page."""
+    """Numbers of the leaf pages in row order, many at a time; a number outside the file means a lost page."""
     waiting, ready, seen, depth = [(root, 0)], [np.empty(0, np.int64)], 0, DEEPEST
     while waiting and seen <= file.pages:
         number, level = waiting.pop()
         below = _children(file, number) if 1 <= number <= file.pages and level < depth else np.empty(0, np.int64)
         seen += 1
         if below is None:
-            depth = level  # all leaves of a B-tree lie equally deep
+            depth = level  # all leaves of a B-tree are at the same level
             below = np.array([number])
         elif below.size and level + 1 < depth:
             inside = below[(below >= 1) & (below <= file.pages)]
@@ -97,7 +97,7 @@ def leaves(file: PageFile, root: int) -> Iterator[NDArray[np.int64]]:
 
 @compiled
 def varint(data: Bytes, at: int) -> tuple[np.int64, int]:
-    """Value and the offset after it; at most 9 bytes from ``at`` must be there."""
+    """Value, and the offset after it; ``data`` must have 9 bytes from ``at``."""
     value = np.int64(0)
     for index in range(8):
         byte = np.int64(data[at + index])
@@ -126,11 +126,11 @@ def leaf_cells(
 ) -> tuple[int, int, int]:
     """Find the messages (id, topic_id, timestamp, data) of some leaf pages.
 
-    buffer:  pages ``first``, ``first + 1``, ... up to byte ``filled``, then free space from ``spill`` for chained data
-    numbers: the leaf pages to look at
-    topics:  index of the topic by topic id, -1 where it is not wanted, as those after the last
-    rows:    out, one per message that is wanted: row id, topic, log time, start in buffer (-1: not within reach), length
-    Returns how many messages, how many damaged pages, and the end of the chained data (over the buffer: too small).
+    buffer:  pages ``first``, ``first + 1``, ... up to byte ``filled``, then free space from ``spill`` for data of overflow pages
+    numbers: the leaf pages to read
+    topics:  index of the topic by topic id, -1 for unwanted ones; ids after the last are unwanted
+    rows:    output, one per wanted message: row id, topic, log time, start in buffer (-1: its pages are not in the buffer), length
+    Returns the number of messages (-1: a larger ``rows`` or buffer is needed), of damaged pages, and the end of the overflow data.
     """
     found, damaged = 0, 0
     for number in numbers:
@@ -150,7 +150,7 @@ def leaf_cells(
             if at >= end:
                 broken = True
                 continue
-            # A damaged cell may lead over the end of its page, but never over the free space behind the pages.
+            # A damaged cell may extend beyond its page, but never beyond the free space behind the pages.
             payload, at = varint(buffer, at)
             row_id, at = varint(buffer, at)
             local = payload

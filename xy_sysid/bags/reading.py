@@ -1,4 +1,4 @@
-"""A rosbag2 recording as a whole: a folder with metadata.yaml and one or more files, or a bare file."""
+"""A full rosbag2 recording: a folder with metadata.yaml and one or more files, or a single file."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from xy_sysid.errors import BadRecording
 STORAGES: Mapping[str, type[SqliteFile] | type[McapFile]] = {".db3": SqliteFile, ".mcap": McapFile}
 ANOTHER_COPY = "Take another copy of the bag."
 METADATA = 1 << 21  # bytes; no bag has longer metadata
-WORDS = 100_000  # parts of metadata; more is no description of a bag
-DIGITS = 20  # of a number of messages
+WORDS = 100_000  # most parts of metadata of a bag
+DIGITS = 20  # most digits of a number of messages
 KNOWN = "a rosbag2 folder, .db3, .mcap"
 
 
@@ -38,9 +38,9 @@ class Topic:
 
 
 class Bag:
-    """A recording opened for reading: ``topics``, ``batches`` and ``notes`` on what was odd about it.
+    """A recording opened for reading: ``topics``, ``batches``, and ``notes`` on anomalies.
 
-    Raises BadRecording, one line, if there is nothing that can be read.
+    Raises BadRecording, one line, if nothing can be read.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -69,7 +69,7 @@ class Bag:
         self._closed.close()
 
     def kind(self, topic: str) -> str | None:
-        """Message type of a topic, None if it is not there."""
+        """Message type of a topic; None for an unknown topic."""
         return next((item.kind for item in self.topics if item.name == topic), None)
 
     def of_kind(self, kind: str) -> list[str]:
@@ -77,11 +77,11 @@ class Bag:
         return [item.name for item in self.topics if item.kind == kind]
 
     def listing(self) -> str:
-        """What the bag holds, for people."""
+        """The topics with their types, in words."""
         return ", ".join(f"{item.name} ({item.kind.rsplit('/', 1)[-1]})" for item in self.topics) or "no topics"
 
     def batches(self, wanted: Sequence[str]) -> Iterator[tuple[Batch, float]]:
-        """Messages of these topics in log order, with the part of the recording that has been read (0..1)."""
+        """Messages of these topics in log order, with the fraction of the recording that has been read (0..1)."""
         unpack: Callable[[bytes, int], bytes] | None = decompressor(self._compressed, self.path) if self._compressed else None
         self.counts = dict.fromkeys(wanted, 0)
         for index, file in enumerate(self.files):
@@ -95,7 +95,7 @@ class Bag:
                 self.notes.append(f"metadata.yaml says {expected} messages on {name}; {self.counts[name]} are there and were read")
 
     def bad(self, problem: str, act: str) -> BadRecording:
-        """The error for this bag, with what was odd about it first."""
+        """The error for this bag; its text starts with the notes."""
         return BadRecording(self.path, "; ".join([*self.notes, problem]), act)
 
     def _open(self, path: Path) -> SqliteFile | McapFile:
@@ -193,7 +193,7 @@ class Bag:
             self._expected = {str(item["topic_metadata"]["name"]): int(item["message_count"][:DIGITS]) for item in counted}
 
     def _expand(self, file: Path, method: str) -> Path:
-        """A file compressed as a whole, written out beside nothing of the user's."""
+        """A file compressed as a whole, decompressed to a temporary folder."""
         folder = Path(self._closed.enter_context(tempfile.TemporaryDirectory()))
         target = self._checked(folder / file.stem)
         expand(file, target, method)
@@ -201,12 +201,12 @@ class Bag:
 
 
 def _yaml(path: Path, text: str) -> Any:
-    """The content, all values as text; raises BadRecording for what is crafted rather than written by a recorder."""
+    """The content, all values as text; raises BadRecording for a document that is too long or deep to be a recorder's."""
     if too_much(text, WORDS):
         raise BadRecording(path, "metadata.yaml is nested, repeated or long in a way that no recorder writes", ANOTHER_COPY)
     return yaml.load(text, Loader=PARSER)
 
 
 def _word(value: object) -> str:
-    """Text, empty for YAML's ways to say nothing."""
+    """The text; empty for YAML's null, and for a value that is not text."""
     return value if isinstance(value, str) and value not in ("null", "~") else ""

@@ -1,4 +1,4 @@
-"""A rosbag2 sqlite3 file: which topics it has, and its messages in the order in which they were logged."""
+"""A rosbag2 sqlite3 file: its topics, and its messages in log order."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from xy_sysid.bags.stride import Batch, Indices
 from xy_sysid.errors import BadRecording
 
 COLUMNS = ["id", "topic_id", "timestamp", "data"]
-BESIDE = ("-journal", "-wal", "-shm")  # endings of the files that sqlite keeps beside a database
-ROWS = 1024  # rows fetched at once on the slow way
+BESIDE = ("-journal", "-wal", "-shm")  # endings of the files that sqlite keeps next to a database
+ROWS = 1024  # rows fetched at once by SQL
 TOPICS = 1 << 16  # topic ids from 0 up to here are looked up in a table; others are read by SQL
 
 
 def files_of(path: Path) -> list[Path]:
-    """What sqlite opens of a database: itself, and what is there of the files beside it. Raises BadRecording where one is no regular file."""
+    """The files of a database that exist: itself, and those of ``BESIDE``. Raises BadRecording if one is not a regular file."""
     found = [path, *(beside for ending in BESIDE if (beside := path.with_name(path.name + ending)).exists())]
     for file in found:
         regular_file(file)
@@ -31,7 +31,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def _unsaved(path: Path) -> list[Path]:
-    """Files beside the database in which sqlite keeps changes that are not in it yet."""
+    """Files next to the database with changes that are not in it yet."""
     found = []
     for ending in BESIDE[:2]:
         beside = path.with_name(path.name + ending)
@@ -42,7 +42,7 @@ def _unsaved(path: Path) -> list[Path]:
 
 
 def _connect(path: Path, mode: str) -> sqlite3.Connection:
-    """Open; a file that was cut short is opened too (``writable_schema`` lifts sqlite's check of its length)."""
+    """Open a database, also a truncated one (``writable_schema`` disables sqlite's check of the length)."""
     connection = sqlite3.connect(f"file:{_quoted(path)}?{mode}", uri=True)
     connection.execute("PRAGMA writable_schema=ON")
     connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
@@ -75,7 +75,7 @@ class SqliteFile:
             raise
 
     def _open(self) -> sqlite3.Connection:
-        # A journal left by a process that was killed is rolled back first, which needs to write; else read as it is.
+        # The journal of a killed process is rolled back first, which needs write access; otherwise the file is read unchanged.
         ways = ["mode=rw", "mode=ro", "immutable=1"] if _unsaved(self.path) else ["mode=ro", "immutable=1"]
         problem = ""
         for way in ways:
@@ -94,7 +94,7 @@ class SqliteFile:
         self._closed.close()
 
     def batches(self, wanted: Sequence[str], unpack: Callable[[bytes, int], bytes] | None) -> Iterator[tuple[Batch, float]]:
-        """Messages of these topics in log order, with the part of the file that has been read."""
+        """Messages of these topics in log order, with the fraction of the file that has been read."""
         lookup = {identity: wanted.index(name) for identity, name, _ in self.ids if name in wanted}
         info = [str(row[1]) for row in self.database.execute("PRAGMA table_info(messages)")]
         root = self.database.execute("SELECT rootpage FROM sqlite_master WHERE name='messages' AND type='table'").fetchone()
@@ -126,7 +126,7 @@ class SqliteFile:
             self.notes.append(f"{self.path.name}: {damaged} of its {file.pages} pages are damaged or missing; what they held is left out")
 
     def _by_id(self, ids: Indices, lookup: dict[int, int]) -> Batch:
-        """Messages whose chained pages lie far apart: sqlite fetches them."""
+        """Messages whose overflow pages are far apart, read by SQL."""
         found = []
         for identity in ids.tolist():
             try:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from xy_sysid.errors import BadRecording
 
-PAGE = 1 << 15  # bytes; in sqlite's own 4096, blocks of 20 rows leave a tenth empty, and reading takes longer
+PAGE = 1 << 15  # bytes; with sqlite's default of 4096, blocks of 20 rows leave a tenth empty, and reading takes longer
 SCHEMA = """
 CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
 CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);
@@ -22,7 +22,7 @@ INSERT INTO schema(schema_version, ros_distro) VALUES (4, 'jazzy');
 
 
 class SqliteWriter:
-    """One .db3 file. A journal is kept during each commit only, so the file alone is a whole bag between them."""
+    """One .db3 file. A journal exists only during a commit; between commits the file alone is a complete bag."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

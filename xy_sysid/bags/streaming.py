@@ -1,4 +1,4 @@
-"""A bag of any length as blocks of voltage and position, in log order and in flat memory."""
+"""A bag of any length as blocks of voltage and position, in log order and with constant memory."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from xy_sysid.samples.joint_states import JointCounter
 from xy_sysid.units import Units
 
 VOLTAGE, POSITION, REFERENCE = "/xy/voltage", "/xy/position", "/xy/reference"
-PIECE = 2000  # samples; the rings that pair them hold sixteen times as many
-AFTER_ODD = 2  # messages after one whose counter went back that come one by one, until the pairer has decided what that meant
-CLOCK_SAMPLES = 2000  # stamps from which the period of a joint state stream is learnt
-EFFORT_UNITS = Units("effort", "position")  # joint states name no unit: N m or N, rad or m
+PIECE = 2000  # samples of a block; the buffers that pair samples hold sixteen times as many
+AFTER_ODD = 2  # messages that come one by one after a counter that went back, until the pairing has decided on its cause
+CLOCK_SAMPLES = 2000  # stamps from which the period of a joint state stream is computed
+EFFORT_UNITS = Units("effort", "position")  # joint states have no unit: N m or N, rad or m
 OTHERS = "Name others with --topic voltage=NAME, position=NAME or joints=NAME."
 
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """What to read of a bag: block topics of input and output, the JointState topic (found if there is one only), and its effort as the input.
+    """What to read from a bag: block topics of input and output, the JointState topic (found if it is the only one), and its effort as input.
 
-    output: field of the joint states that is the output; None: the velocity where no joint has a position
-    joints: the joint of each axis, as x=shoulder_pan_joint; none: every joint is an axis of its name
-    effort_lag: samples by which effort is older than its stamp
+    output: field of the joint states that is the output; None: the position, or the velocity if no joint has a position
+    joints: the joint of each axis, as x=shoulder_pan_joint; empty: every joint is an axis of its name
+    effort_lag: age of the effort relative to its stamp, samples
     """
 
     voltage_topic: str = VOLTAGE
@@ -52,11 +52,11 @@ USUAL = Topics()
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where input and output come from.
+    """Source of input and output.
 
-    topics: (name, kind) of the block topics; joints: the JointState topic or None; effort: input is its effort; output: which of its fields
-    said:   whether effort was asked for, rather than found as the only input there is
-    axes:   axis of each joint that is read; empty is all, under their own names; lag: samples by which effort is older
+    topics: (name, kind) of the block topics; joints: the JointState topic or None; effort: True if its effort is the input; output: its field
+    said:   True if the user chose effort; False if it was the only input found
+    axes:   axis of each joint that is read; empty: all, under their own names; lag: age of the effort, samples
     """
 
     topics: tuple[tuple[str, StreamName], ...]
@@ -69,7 +69,7 @@ class Source:
 
 
 def choose(bag: Bag, topics: Topics) -> Source:
-    """Decide which topics to read; raises BadRecording that names the topics there are."""
+    """Decide which topics to read; raises BadRecording, which lists the bag's topics."""
     voltage_topic, position_topic, effort_as_voltage = topics.voltage_topic, topics.position_topic, topics.effort_as_voltage
     blocks = [name for name in (voltage_topic, position_topic) if bag.kind(name) == ARRAY_TYPE]
     joints = topics.joint_topic
@@ -104,7 +104,7 @@ def choose(bag: Bag, topics: Topics) -> Source:
 
 
 def _given(bag: Bag, topic: str, joints: Sequence[str]) -> JointOutput:
-    """Velocity, and a note, where none of the joints (none: all) has a number for a position in the whole bag, and one has a velocity."""
+    """Velocity, with a note, if none of these joints (empty: all) has a position in the whole bag, and one has a velocity; otherwise position."""
     reader, moving, said = Reader(joint_layout), False, len(bag.notes)
     for batch, _ in bag.batches([topic]):
         for stretch in reader.stretches(batch):
@@ -122,7 +122,7 @@ def _given(bag: Bag, topic: str, joints: Sequence[str]) -> JointOutput:
 
 
 def _any_numbers(batch: Batch, stretch: Stretch, field: int, columns: list[int]) -> bool:
-    """Whether any of these joints has a number in one of the messages."""
+    """True if any of these joints has a finite number in one of the messages."""
     layout = stretch.layout
     if layout is None or not columns or layout.parts[field][1] != len(layout.names):
         return False
@@ -130,14 +130,14 @@ def _any_numbers(batch: Batch, stretch: Stretch, field: int, columns: list[int])
 
 
 def units(bag: Bag, source: Source) -> Units:
-    """Of input and position, as the bag tells them."""
+    """Units of input and position, from the bag."""
     if source.effort and not source.said:
         return EFFORT_UNITS
     return Units(bag.custom.get("input_unit", "V"), bag.custom.get("output_unit", "m"))
 
 
 class _Clock:
-    """Sample numbers for stamps: periods since the last stamp, or since the voltage sample before each."""
+    """Sample numbers for stamps: periods since the previous stamp, or since the last voltage sample before each."""
 
     def __init__(self, period: float) -> None:
         self.period = period
@@ -148,21 +148,21 @@ class _Clock:
         self.seq, self.time = self.seq[-1:], self.time[-1:]
 
     def anchor(self, block: Block) -> None:
-        """Samples whose number and instant are known."""
+        """Add samples whose number and time are known."""
         finite = np.isfinite(block.time) & np.isfinite(block.seq)
         seq, time = np.append(self.seq, block.seq[finite]), np.append(self.time, block.time[finite])
         order = np.argsort(time, kind="stable")
         self.seq, self.time = seq[order], time[order]
 
     def near(self, time: FloatArray) -> FloatArray:
-        """(n,) numbers of stamps by the anchors; not a number before there is one."""
+        """(n,) sample numbers of stamps relative to the anchors; NaN without an anchor."""
         if not self.time.size:
             return np.full(len(time), np.nan)
         place = np.maximum(np.searchsorted(self.time, time, side="right") - 1, 0)
         return np.asarray(self.seq[place] + np.rint((time - self.time[place]) / self.period))
 
     def follow(self, time: FloatArray) -> FloatArray:
-        """(n,) numbers of stamps by their own steps, from 0."""
+        """(n,) sample numbers of stamps from their own steps, starting at 0."""
         before, number = (self.time[-1], self.seq[-1]) if self.time.size else (time[0], 0.0)
         seq = number + np.cumsum(np.rint(np.diff(time, prepend=before) / self.period))
         self.seq, self.time = seq[-1:], time[-1:]
@@ -171,7 +171,7 @@ class _Clock:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Decoded messages of one kind: ``message`` is the place in the batch of each, ``rows`` its number of samples."""
+    """Decoded messages of one kind: ``message`` is the index of each in the batch, ``rows`` its number of samples."""
 
     kind: StreamName
     message: Indices
@@ -180,10 +180,10 @@ class _Part:
 
 
 class _Decoder:
-    """Turns batches of raw messages into blocks, and counts what could not be read."""
+    """Converts batches of raw messages to blocks, and counts unreadable messages."""
 
     def __init__(self, bag: Bag, source: Source, live: bool = False) -> None:
-        """live: joint states with effort are numbered one by one as the nodes do, and not by all that is known of them."""
+        """live: number joint states with effort one by one as the nodes do, without later data."""
         self.bag, self.source, self.live = bag, source, live
         self.counter: JointCounter | None = None
         self.names = [name for name, _ in source.topics] + ([source.joints] if source.joints else [])
@@ -194,7 +194,7 @@ class _Decoder:
         self.joints: tuple[str, ...] = ()
         self.from_log: bool | None = None
         self.clock: _Clock | None = None
-        self.moved: Moved | None = None  # live: velocities become positions here, else when all is known
+        self.moved: Moved | None = None  # live: velocities become positions here; otherwise after all data have been read
 
     def parts(self, batch: Batch) -> list[_Part]:
         parts: list[_Part] = []
@@ -287,14 +287,14 @@ class _Decoder:
             values = self.moved.add(seq, values, self.clock.period)
         parts = [_Part("position", places, 1, Block(axes, seq, time, values))]
         if self.source.effort:
-            lag = self.source.lag if self.clock is not None else 0  # while the clock is learnt, counters say nothing
+            lag = self.source.lag if self.clock is not None else 0  # before the period is known, counters carry no information
             known, since = seq >= lag, lag * self.clock.period if self.clock is not None else 0.0
             efforts = Block(axes, seq[known] - lag, time[known] - since, doubles(batch, stretch, 2)[known][:, order])
             parts.insert(0, _Part("voltage", places[known], 1, efforts))
         return [part for part in parts if len(part.block)]
 
     def counted(self, axes: tuple[str, ...], places: Indices, time: FloatArray, rows: FloatArray) -> list[_Part]:
-        """Positions and efforts with the numbers that they had live; a sample that was decided late stands where that was."""
+        """Positions and efforts with their numbers of live operation; a sample that was decided late comes at the time of the decision."""
         self.counter = self.counter or JointCounter(axes, with_voltage=False, output=self.source.output)
         found = [(place, self.counter.add(float(at), row)) for place, at, row in zip(places.tolist(), time, rows, strict=True)]
         blocks = [(place, block) for place, block in found if block is not None]
@@ -329,9 +329,9 @@ def _highest(level: Indices, samples: Indices) -> None:
 
 @compiled
 def _starts(seq: FloatArray, rows: int, before: float, group: Indices) -> Indices:
-    """Messages that begin a piece: where the group changes, and where the counter does not go on upwards.
+    """Messages that begin a block: where the group changes, and where the counter does not increase.
 
-    Those come one by one, as they came live: what is odd about one must not be laid at the door of others.
+    The latter come one by one, as in live operation, so that an anomaly of one is not attributed to others.
     before: the counter before the first
     """
     found = np.empty(group.shape[0], np.int64)
@@ -350,7 +350,7 @@ def _starts(seq: FloatArray, rows: int, before: float, group: Indices) -> Indice
 
 
 def _cut(parts: list[_Part], most: int, newest: dict[StreamName, float]) -> Iterator[tuple[StreamName, Block]]:
-    """Blocks of about ``most`` samples, those of all kinds side by side, in log order. newest: last counter of each kind so far."""
+    """Blocks of about ``most`` samples, alternating between kinds, in log order. newest: last counter of each kind so far."""
     if not parts:
         return
     last = 1 + max(int(part.message[-1]) for part in parts)
@@ -375,7 +375,7 @@ def _cut(parts: list[_Part], most: int, newest: dict[StreamName, float]) -> Iter
 
 
 def _period(bag: Bag, source: Source) -> float:
-    """Sample period of the stream that gives the sample numbers to the joint states, s."""
+    """Sample period of the stream that numbers the joint states, s."""
     decoder = _Decoder(bag, source)
     times: list[FloatArray] = []
     seqs: list[FloatArray] = []
@@ -392,7 +392,7 @@ def _period(bag: Bag, source: Source) -> float:
         act = OTHERS if source.effort else "Record for longer."
         raise bag.bad(f"fewer than 2 samples of {input_name} that can be read{f' ({why})' if why else ''}; it has {bag.listing()}", act)
     time, seq = np.concatenate(times), np.concatenate(seqs)
-    lag = 1 if source.effort else max(1, len(time) // 2)  # far apart, where the numbers are known, for many digits
+    lag = 1 if source.effort else max(1, len(time) // 2)  # with known numbers, a large distance gives many digits
     steps, counts = time[lag:] - time[:-lag], np.ones(1) if source.effort else seq[lag:] - seq[:-lag]
     steps, counts = np.broadcast_arrays(steps, counts)
     usable = (steps > 0) & (counts > 0)
@@ -402,9 +402,9 @@ def _period(bag: Bag, source: Source) -> float:
 
 
 def pieces(bag: Bag, source: Source, most: int, progress: Callable[[float], None] | None, live: bool = False) -> Iterator[tuple[StreamName, Block]]:
-    """The blocks of an open bag; notes on what was left out are added to ``bag.notes`` at the end.
+    """The blocks of an open bag; notes on omitted data are added to ``bag.notes`` at the end.
 
-    live: joint states are numbered as a node would have, without knowing what comes later
+    live: number joint states as a node would, without later data
     """
     decoder = _Decoder(bag, source, live)
     if source.joints is not None and not (live and source.effort):
@@ -428,11 +428,11 @@ def stream_blocks(
     progress: Callable[[float], None] | None = None,
     about: Callable[[Units], None] | None = None,
 ) -> Iterator[tuple[StreamName, Block]]:
-    """("voltage" | "position" | "reference", Block) in log order, in flat memory.
+    """("voltage" | "position" | "reference", Block) in log order, with constant memory.
 
-    chunk_samples: about how many samples of one kind come in one block, so also how far the kinds are apart
-    notes:         gets a sentence for everything that was odd or left out; complete when the iteration has ended
-    progress:      called with the part that has been read, 0..1
+    chunk_samples: approximate number of samples in a block, and so the largest offset between the kinds
+    notes:         receives a sentence for each anomaly or omission; complete when the iteration has ended
+    progress:      called with the fraction that has been read, 0..1
     about:         called with the units of input and output before the first block
     Raises BadRecording if nothing can be read.
     """

@@ -1,7 +1,7 @@
-"""From raw messages to arrays, without deserializing each: prove that the layout is constant, then stride.
+"""From raw messages to arrays without deserializing each: check that the layout is constant, then copy at fixed offsets.
 
-Messages are taken in log order. A stretch of equal length whose fixed bytes equal the first one's is copied out in
-one go; where the layout changes a new stretch begins, so that a mixture costs one parse per change and the worst case
+Messages are read in log order. A stretch of messages with equal length and the fixed bytes of the first is copied at
+once; a change of the layout begins a new stretch, so a mixture needs one parse per change, and the worst case
 is one parse per message.
 """
 
@@ -24,11 +24,11 @@ Indices = NDArray[np.int64]
 class Batch:
     """Raw messages in log order.
 
-    topic:    (n,) index into the list of topics asked for
+    topic:    (n,) index into the list of requested topics
     log_time: (n,) ns
     start:    (n,) offset of each message in ``buffer``
-    length:   (n,) its length in bytes
-    buffer:   the bytes; reused by the next batch, so copy what must stay
+    length:   (n,) length of each message in bytes
+    buffer:   the bytes; the next batch reuses it, so copy data to keep
     """
 
     topic: Indices
@@ -40,7 +40,7 @@ class Batch:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Messages ``first`` to ``last`` (exclusive) of one layout; ``layout`` is None if one is not readable."""
+    """Messages ``first`` to ``last`` (exclusive) of one layout; ``layout`` is None for an unreadable message."""
 
     first: int
     last: int
@@ -83,7 +83,7 @@ class Reader:
         self.used = np.empty(0, np.uint8)
 
     def stretches(self, batch: Batch) -> Iterator[Stretch]:
-        """The batch cut where the layout changes; all its messages must be of this topic."""
+        """The batch, divided where the layout changes; all its messages must be of this topic."""
         first, count = 0, int(batch.start.shape[0])
         while first < count:
             last = first
@@ -115,7 +115,7 @@ def doubles(batch: Batch, stretch: Stretch, part: int) -> FloatArray:
 
 
 def stamps(batch: Batch, stretch: Stretch) -> Indices:
-    """(messages,) header stamps, ns; the log time where a stamp is zero."""
+    """(messages,) header stamps, ns; the log time if a stamp is zero."""
     layout = stretch.layout
     assert layout is not None
     raw = np.empty((stretch.last - stretch.first, 8), np.uint8)

@@ -1,6 +1,6 @@
-"""Check sums of what is written to sqlite3, which has none of its own: CRC-32 of each topic, in metadata.yaml.
+"""Checksums for sqlite3 files, which have none of their own: CRC-32 of each topic, in metadata.yaml.
 
-MCAP has sums of its own, and its reader checks them.
+MCAP has its own checksums, and its reader checks them.
 """
 
 from __future__ import annotations
@@ -17,38 +17,38 @@ from xy_sysid.errors import BadRecording
 
 KEY = "xy_sysid_crc32"  # in custom_data of metadata.yaml: {topic: [messages, sum]} as JSON
 Checked = Literal["none", "good", "damaged"]
-LARGEST = 1 << 22  # bytes of a metadata.yaml of our recorder, by far
+LARGEST = 1 << 22  # bytes; no metadata.yaml of our recorder is as large
 BODY = "SELECT topics.name, messages.data FROM messages JOIN topics ON topics.id = messages.topic_id ORDER BY messages.id"
 
 
 class Sums:
-    """Adds up the messages of a recording as they are written."""
+    """Running checksums of the messages of a recording."""
 
     def __init__(self) -> None:
         self._found: dict[str, tuple[int, int]] = {}
 
     def add(self, topic: str, data: bytes) -> None:
-        """The next message of a topic."""
+        """Add the next message of a topic."""
         count, value = self._found.get(topic, (0, 0))
         self._found[topic] = count + 1, crc32(data, value)
 
     def count(self, topic: str) -> int:
-        """Messages so far."""
+        """Number of messages so far."""
         return self._found.get(topic, (0, 0))[0]
 
     def sum(self, topic: str) -> int:
-        """What they add up to."""
+        """CRC-32 of the messages so far."""
         return self._found.get(topic, (0, 0))[1]
 
     def text(self) -> dict[str, str]:
-        """What to keep in metadata.yaml."""
+        """The entry for metadata.yaml."""
         return {KEY: json.dumps(self._found)} if self._found else {}
 
 
 def check_sums(path: Path) -> Checked:
-    """Whether a bag has sums, and whether its file is too damaged to be added up; raises BadRecording where its messages do not add up to them.
+    """ "none" without checksums, "good" if they agree, "damaged" if the file is; raises BadRecording for an intact file with other messages.
 
-    A recorder that was killed has written a second of messages more than it has summed up: those are not checked.
+    After a killed recorder the last second of messages is not checked, because it is not in the checksums.
     """
     told = _told(path)
     if not told:
@@ -61,7 +61,7 @@ def check_sums(path: Path) -> Checked:
                     if isinstance(data, bytes) and found.count(topic) < told.get(topic, (0, 0))[0]:
                         found.add(topic, data)
     except sqlite3.Error:
-        return "damaged"  # the reader says with what, and reads the rest
+        return "damaged"  # the reader reports the damage, and reads the rest
     for topic, (count, value) in told.items():
         if found.count(topic) == count and found.sum(topic) != value:
             if not all(map(_sound, _databases(path))):
@@ -72,7 +72,7 @@ def check_sums(path: Path) -> Checked:
 
 
 def _databases(path: Path) -> list[Path]:
-    """The databases of a bag; a pipe or a device that is called like one is none."""
+    """The databases of a bag, without pipes and devices of such a name."""
     found = []
     for file in sorted(path.glob("*.db3")):
         with suppress(BadRecording, OSError):
@@ -81,7 +81,7 @@ def _databases(path: Path) -> list[Path]:
 
 
 def _sound(name: Path) -> bool:
-    """Whether a database is one, whatever stands in it: a file that was cut or torn may give anything."""
+    """True if the file is a complete, valid database, with any content; a truncated or damaged one may give wrong messages."""
     try:
         with closing(sqlite3.connect(f"{name.absolute().as_uri()}?mode=ro", uri=True)) as file:
             (pages,), (size,) = file.execute("PRAGMA page_count").fetchone(), file.execute("PRAGMA page_size").fetchone()
@@ -91,12 +91,12 @@ def _sound(name: Path) -> bool:
 
 
 def _told(path: Path) -> dict[str, tuple[int, int]]:
-    """(messages, sum) of each topic; nothing where our recorder has written no sums."""
+    """(number of messages, sum) of each topic; empty without checksums of our recorder."""
     file = path / "metadata.yaml"
     try:
         if not file.is_file() or file.stat().st_size > LARGEST:
             return {}
-        document: Any = json.loads(file.read_text("utf-8"))  # ours is JSON
+        document: Any = json.loads(file.read_text("utf-8"))  # that of our recorder is JSON
         told = json.loads(document["rosbag2_bagfile_information"]["custom_data"][KEY])
         return {str(topic): (int(count), int(value)) for topic, (count, value) in told.items()}
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):

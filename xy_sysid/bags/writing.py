@@ -1,4 +1,4 @@
-"""Writes a rosbag2 that is complete up to the last second at any moment, so that a killed recorder loses no more."""
+"""Writes a rosbag2 that is always complete up to the last second, so that a killed recorder loses no more than that."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from xy_sysid.samples.block import Block, FloatArray, columns, pack
 
 Storage = Literal["sqlite3", "mcap"]
 EVERY = 1.0  # seconds between two commits
-MOST = 1 << 22  # bytes; a commit comes earlier when so much is waiting
+MOST = 1 << 22  # bytes; a commit comes earlier if this much is waiting
 VERSION = 9  # of metadata.yaml, as ROS 2 Jazzy writes it
 
 
 @dataclass(slots=True)
 class Written:
-    """One topic of the bag that is being written."""
+    """One topic of the written bag."""
 
     number: int
     kind: str
@@ -37,7 +37,7 @@ class Written:
 
 
 class StorageWriter(Protocol):
-    """What writes one file."""
+    """Writer of one file."""
 
     def add(self, number: int, topic: str, kind: str, text: str, digest: str) -> None: ...
     def write(self, number: int, log_time: int, data: bytes) -> None: ...
@@ -49,11 +49,11 @@ WRITERS: dict[Storage, tuple[str, type[SqliteWriter] | type[McapWriter]]] = {"sq
 
 
 class BagWriter:
-    """A new bag: a folder with metadata.yaml, or a bare file when the path ends in .db3 or .mcap.
+    """A new bag: a folder with metadata.yaml, or a single file if the path ends in .db3 or .mcap.
 
-    Use it as a context manager. What is written reaches the disk within a second of more being written; call ``flush``
-    from a timer where a stream may pause. custom: texts kept in metadata.yaml (folders only).
-    Raises BadRecording if the path exists already or cannot be written.
+    Use it as a context manager. Data reach the disk at the first write a second later; call ``flush``
+    from a timer if a stream may pause. custom: texts for metadata.yaml (folders only).
+    Raises BadRecording if the path exists or cannot be written, BadInput for a wrong ``storage``.
     """
 
     def __init__(self, path: Path | str, storage: Storage | None = None, custom: dict[str, str] | None = None) -> None:
@@ -91,16 +91,16 @@ class BagWriter:
         self.close()
 
     def write_block(self, topic: str, block: Block, log_time_ns: int) -> None:
-        """One message of samples."""
+        """Write one message of samples."""
         sizes = (len(block), 2 + len(block.axes))
         self.write_raw(topic, ARRAY_TYPE, encode_array(("sample", columns(block.axes)), sizes, pack(block)), log_time_ns)
 
     def write_array(self, topic: str, labels: Sequence[str], sizes: Sequence[int], data: FloatArray, log_time_ns: int) -> None:
-        """Any std_msgs/Float64MultiArray, row-major."""
+        """Write any std_msgs/Float64MultiArray, row-major."""
         self.write_raw(topic, ARRAY_TYPE, encode_array(tuple(labels), tuple(sizes), data.ravel()), log_time_ns)
 
     def write_raw(self, topic: str, type_name: str, cdr_bytes: bytes, log_time_ns: int) -> None:
-        """A message that is serialized already; type_name like ``sensor_msgs/msg/JointState``."""
+        """Write a serialized message; type_name like ``sensor_msgs/msg/JointState``."""
         written = self.topics.get(topic)
         if written is None:
             text, digest = definition(type_name)
@@ -120,11 +120,11 @@ class BagWriter:
 
     @property
     def count(self) -> int:
-        """Messages written so far."""
+        """Number of messages written so far."""
         return sum(written.count for written in self.topics.values())
 
     def flush(self) -> None:
-        """Hand everything written so far to the disk; the bag is then complete up to here."""
+        """Write all waiting messages to the disk; the bag is then complete up to here."""
         if self._waiting:
             self.writer.flush()
             self._describe()
@@ -138,7 +138,7 @@ class BagWriter:
             self._describe()
 
     def _describe(self) -> None:
-        """Rewrite metadata.yaml (JSON is YAML), never leaving half a file."""
+        """Rewrite metadata.yaml (JSON is YAML), completely or not at all."""
         if self.metadata is None:
             return
         half = self.metadata.with_suffix(".yaml.tmp")
@@ -178,7 +178,7 @@ class BagWriter:
 
 
 class _Closed:
-    """Stands where the writer was; a bag that is closed takes no more."""
+    """The writer of a closed bag; it accepts no messages."""
 
     def add(self, number: int, topic: str, kind: str, text: str, digest: str) -> None:
         raise BadInput("bag", "closed", "open", "Write before closing it.")
@@ -195,9 +195,9 @@ class _Closed:
 
 @functools.cache
 def definition(kind: str) -> tuple[str, str]:
-    """(text of the definition, hash) of a message type of ROS 2 Jazzy, which a bag carries along so that others can read it without ROS.
+    """(text of the definition, hash) of a message type of ROS 2 Jazzy, which a bag contains so that it can be read without ROS.
 
-    Empty for a type that is not one.
+    Both are empty for an unknown type.
     """
     from rosbags.typesys import Stores, get_typestore
     from rosbags.typesys.base import TypesysError

@@ -18,7 +18,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 INTERRUPTED, TERMINATED, WRONG = 130, 143, 2
 _interrupts = Interrupts()
-LONGEST = 800  # characters of a refusal; a value may be as long as a whole file
+LONGEST = 800  # characters of an error message; the wrong value in it may be very long
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -41,13 +41,13 @@ def run(arguments: Sequence[str]) -> int:
     except MemoryError:
         return _refuse("Not enough memory. Give a shorter part with --span, or a shorter window with --set length=.")
     except Exception:
-        if _interrupts.came:  # imports of compiled modules, and of classes with descriptors, make errors of their own of an interrupt
+        if _interrupts.came:  # an interrupt in the import of a compiled module, or of a class with descriptors, becomes another error
             return _stopped()
         raise
 
 
 def _command(arguments: Sequence[str]) -> int:
-    """The exit code of a command, or of its refusal by typer."""
+    """The exit code of a command, or of typer's error."""
     import typer
     from typer.exceptions import TyperException
 
@@ -72,7 +72,7 @@ def _command(arguments: Sequence[str]) -> int:
 
 @cache
 def _commands() -> Callable[..., object]:
-    """The parser of the arguments of all commands, made once."""
+    """The parser of the arguments of all commands, cached."""
     from typer.main import get_command
 
     from xy_sysid.cli.app import app
@@ -100,7 +100,7 @@ def _unless_terminated(code: object) -> int:
 
 
 def _say(line: str) -> None:
-    """A line on stderr; if even that cannot be written, the exit code remains."""
+    """Write a line to stderr; if this fails, only the exit code remains."""
     try:
         sys.stderr.write(printable(line))
         sys.stderr.flush()
@@ -109,7 +109,7 @@ def _say(line: str) -> None:
 
 
 def _nobody_reads() -> int:
-    """The reader of a pipe has closed it: nothing more is written."""
+    """Discard further output, because the reader of the pipe has closed it; the exit code is 0."""
     _discard(sys.stdout)
     return 0
 
@@ -136,18 +136,18 @@ def _ended(code: int) -> int:
 
 
 def _nowhere() -> TextIO:
-    """Replaces a stream that the caller has closed."""
+    """A stream that discards its input, for one that the caller has closed."""
     return os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
 
 
 def main() -> None:
     """Entry point of the console script."""
-    atexit.register(_interrupts.leave)  # the first is the last to be called: then the exit code stands
+    atexit.register(_interrupts.leave)  # registered first, called last: then the exit code is final
     sys.stdout = sys.stdout or _nowhere()
     sys.stderr = sys.stderr or _nowhere()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a file's name may hold what the terminal cannot show
+            stream.reconfigure(errors="backslashreplace")  # the name of a file may contain characters that the terminal cannot show
     with _interrupts:
         code = run(sys.argv[1:])
     _interrupts.code = _ended(code)

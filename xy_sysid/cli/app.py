@@ -1,4 +1,4 @@
-"""The commands by name. Each is one file; it imports what it needs when it runs, so that --help is quick."""
+"""The commands by name. Each is one file; it imports other modules only when it runs, so that --help is fast."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""xy-sysid columns: what is in a file?"""
+"""xy-sysid columns: the content of a file."""
 
 from __future__ import annotations
 

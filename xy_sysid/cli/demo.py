@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from xy_sim.machine import Machine
     from xy_sysid.cli.monitor import Monitor
 
-DELAY_WITHIN, RESONANCE_WITHIN, ERROR_WITHIN = 20e-6, 0.2, 0.015  # s, Hz, 1: what the demo promises on paper.yaml
+DELAY_WITHIN, RESONANCE_WITHIN, ERROR_WITHIN = 20e-6, 0.2, 0.015  # s, Hz, 1: allowed errors of the demo on paper.yaml
 BLOCK = 100  # samples in one message: a fifth of the usual work for the nodes
 
 
@@ -111,7 +111,7 @@ def _specs(table: Machine, machine: str, seconds: float, speed: float, seed: int
 
 
 def _watch(specs: list[Any], axes: tuple[str, ...], seconds: float, plain: bool) -> tuple[int, Monitor, list[str], float]:
-    """Start everything and show it until the end; returns exit code, received results, output of the nodes, and seconds by the clock."""
+    """Start all nodes and show results until the end. Returns exit code, received results, output of the nodes, and duration in s."""
     import os
 
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -157,7 +157,7 @@ def _line(monitor: Monitor, axes: tuple[str, ...]) -> str:
 
 
 def _panel(monitor: Monitor, axes: tuple[str, ...], seconds: float) -> RenderableType:
-    """The live picture: Bode magnitude and results of each axis."""
+    """The live display: Bode magnitude and results of each axis."""
     import numpy as np
     from rich.columns import Columns
     from rich.console import Group
@@ -207,7 +207,7 @@ def figures(values: dict[str, str]) -> list[tuple[str, str]]:
 
 
 def result(monitor: Monitor, axis: str, truth: dict[str, Any]) -> dict[str, Any]:
-    """Estimated value, true value and difference, SI; ``within`` tells whether the difference is small enough."""
+    """Estimated value, true value and difference, SI; ``within`` is True if the difference is small enough."""
     values = monitor.statuses.get(f"axis {axis}", (0, "", {}))[2]
     wanted = {
         "delay": ("delay (s)", truth["delay"], DELAY_WITHIN),

@@ -14,7 +14,7 @@ LAST = 20  # lines of the nodes that are shown when one of them fails
 
 
 def wished(page: bool | None, json: bool) -> bool:
-    """Whether the demo shows a page: as requested, else if it runs in a terminal and NiceGUI is installed."""
+    """True if the demo shows a page: as requested; by default in a terminal with NiceGUI installed."""
     from xy_sysid.cli.output import aside, people
 
     there = importlib.util.find_spec("nicegui") is not None
@@ -32,10 +32,10 @@ TOLD = "See where the rigid model fails, press Diagnose, then Add. Ctrl-C ends e
 def watch_page(
     specs: list[Any], axes: tuple[str, ...], speed: float, port: int, browse: bool, more: tuple[str, ...] = (), words: tuple[str, str] = (TABLE, TOLD)
 ) -> int:
-    """Run the nodes and the page until Ctrl-C or until the page ends; the exit code.
+    """Run the nodes and the page until Ctrl-C or until the page ends; returns the exit code.
 
-    speed: times real time, 0 at full speed; port: of the page, or the next one that is free; browse: open a browser if there is a display
-    more: options of the page; words: what is simulated, and what to do on the page
+    speed: times real time, 0 at full speed; port: of the page, or the next free one; browse: open a browser if there is a display
+    more: options of the page; words: the simulated machine, and the user's next action on the page
     """
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     from xy_sysid.cli.monitor import Monitor, refuse_others

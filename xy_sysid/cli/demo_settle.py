@@ -1,4 +1,4 @@
-"""xy-sysid demo --settle: a simulated machine that one recording does not settle, and the experiments that do, over ROS 2."""
+"""xy-sysid demo --settle: a simulated machine with an ambiguous recording, and the experiments that resolve it, over ROS 2."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 TRAVEL, VOLTAGE = 2.5, 1.2  # rad to each side, V
-RATE = 1000.0  # Hz: that of the machine
-QUIET = {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0, "brake": 0.2}  # the arm stays near hanging
-JOIN = 15.0  # s that the walk may take to end
+RATE = 1000.0  # Hz, of the machine
+QUIET = {"low": 0.5, "high": 20.0, "rms": 0.08, "centring": 0.0, "brake": 0.2}  # the arm stays near the hanging position
+JOIN = 15.0  # s for the series of experiments to end
 WORDS = (
     "a simulated joint whose arm hangs, pulled back by a weight or a spring",
     "It hardly swings: a weight and a spring look the same. Watch the page design the experiment that distinguishes them, and run it.",
@@ -27,9 +27,9 @@ def pulls() -> tuple[tuple[str, ...], ...]:
 
 
 def settle_demo(machine: str, speed: float, seed: int, page: tuple[int, bool] | None, json: bool) -> int:
-    """Start the nodes and settle axis x; the exit code: 0 where it is settled, 1 where not.
+    """Start the nodes and settle the diagnosis of axis x; returns the exit code: 0 if it is settled, otherwise 1.
 
-    page: its port and whether a browser is opened, None prints the steps instead. Bags are kept in the folder that is named.
+    page: its port, and True to open a browser; None prints the steps instead. The bags are kept; their folder is printed.
     """
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     folder = Path(tempfile.mkdtemp(prefix="xy_settle_"))
@@ -43,7 +43,7 @@ def settle_demo(machine: str, speed: float, seed: int, page: tuple[int, bool] | 
 
 
 def specs(machine: str, speed: float, seed: int, watched: bool) -> list[Any]:
-    """The nodes' processes; watched: identifier and diagnoser too, for the page."""
+    """The processes of the nodes; watched: include identifier and diagnoser, for the page."""
     from json import dumps
 
     from xy_sysid.processes.run_plan import plan

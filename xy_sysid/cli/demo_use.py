@@ -1,4 +1,4 @@
-"""The demo --use: after the identification the models are used, and the tracking error of a path falls on the simulated machine."""
+"""xy-sysid demo --use: the identified models reduce the tracking error of a path on the simulated machine."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from xy_sim.machine import Machine
     from xy_sysid.processes.run_plan import ProcessSpec
 
-SLOW, SLOW_PERIOD, CENTRING = 0.35, 15.0, 8.0  # V, s, V/m: the noise rides on a slow sine, so that it covers the travel on which the path will lie
+SLOW, SLOW_PERIOD, CENTRING = 0.35, 15.0, 8.0  # V, s, V/m: a slow sine is added to the noise, so that the motion covers the travel of the path
 SECONDS = 30.0  # of data, without a page
-WAITS = 900.0  # s for the diagnosis, and for the path, on a busy computer
+WAITS = 900.0  # s, timeout of the diagnosis, and of the path
 NODE = "demo_follower"
-BETTER = 1.0  # error with the compensation over that with kS, kV and kA: at most
+BETTER = 1.0  # largest ratio of the error with the compensation to that with kS, kV and kA
 
 
 def excited(axes: tuple[str, ...], specs: list[ProcessSpec]) -> list[ProcessSpec]:
-    """The processes of the demo with an excitation that covers the travel, and with the controller."""
+    """The processes of the demo, with an excitation that covers the travel, and the controller."""
     from dataclasses import replace
 
     from xy_sysid.processes.run_plan import ProcessSpec
@@ -38,7 +38,7 @@ def _slow() -> Mapping[str, float]:
 
 
 def watch_use(specs: list[ProcessSpec], table: Machine, seconds: float, json: bool) -> int:
-    """Identify, diagnose, use, without a page; the exit code: 1 where the error did not fall on every axis."""
+    """Identify, diagnose and use, without a page; returns the exit code: 1 unless the error fell on every axis."""
     import os
 
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -72,13 +72,13 @@ def watch_use(specs: list[ProcessSpec], table: Machine, seconds: float, json: bo
 
 
 def better(found: Mapping[str, Any]) -> bool:
-    """Whether each feedforward helps more than the one before."""
+    """True if each feedforward has a smaller error than the one before."""
     errors = list(found["errors"].values())
     return len(errors) == 3 and errors[1] < errors[0] and errors[2] <= BETTER * errors[1]
 
 
 def show(found: Mapping[str, Mapping[str, Any]]) -> None:
-    """The tracking errors as a table."""
+    """Print the tracking errors as a table."""
     from xy_sysid.cli.output import say, table
     from xy_sysid.control_design.follower import KINDS
 
@@ -101,7 +101,7 @@ class Course:
         self.failed = ""
 
     def over(self) -> bool:
-        """Continue; returns whether all is done."""
+        """Continue; returns True at the end."""
         self._monitor.spin(0.05)
         if self._step == 0:
             self._monitor.start_when_ready()
@@ -120,7 +120,7 @@ class Course:
         return bool(self.failed)
 
     def errors(self, axis: str) -> dict[str, Any]:
-        """Tracking errors by kind, m rms, and what is undone."""
+        """Tracking errors by kind of feedforward, m rms, and the compensated effects."""
         from xy_sysid.control_design.follower import KINDS
 
         values = self._values(NODE)

@@ -74,7 +74,7 @@ def _show(name: str, item: Answer, drive: Transmission) -> None:
     if item.told and item.verdict != "nothing_missing":
         rows = []
         for one in sorted(item.candidates, key=lambda one: (float(f"{one.rung.held_out_error:.2g}"), one.name not in item.effects)):
-            part = "-" if one.rung.one_step else f"{100 * one.explained:.3g} %"  # of another error, one sample ahead
+            part = "-" if one.rung.one_step else f"{100 * one.explained:.3g} %"  # errors of one-step prediction are not comparable
             rows.append((*error_cells(f"{one.name} (refused)" if one.refused else one.name, one.rung), part))
         if rows:
             table(
@@ -94,7 +94,7 @@ def error_cells(name: str, rung: Rung) -> tuple[str, str, str]:
 
 
 def parameter_table(parameters: tuple[Estimate, ...]) -> None:
-    """The parameters in display units."""
+    """Print the parameters in display units."""
     rows = []
     for p in parameters:
         rows.append(estimate(p.name, (p.value, p.low, p.high), p.unit))

@@ -1,4 +1,4 @@
-"""xy-sysid figures: every picture of a recording as vectors, and the numbers that are drawn."""
+"""xy-sysid figures: every figure of a recording as vectors, and its numbers."""
 
 from __future__ import annotations
 
@@ -72,12 +72,12 @@ def figures(
 
 
 def _plain(name: str) -> str:
-    """axis_x: the beginning of a file's name; the name of an axis comes from a recording, and leads into no other folder."""
+    """axis_x, the start of a file name; an axis name from a recording cannot lead to another folder."""
     return "axis_" + re.sub(r"[/\\\0-\x1f]", "_", name)
 
 
 def _free(out: Path, names: tuple[str, ...], kinds: tuple[str, ...]) -> None:
-    """Raises BadInput where a picture of one of these axes is there already, before any is drawn."""
+    """Raises BadInput if a figure of one of these axes exists, before any is drawn."""
     from glob import escape
 
     from xy_sysid.files.unasked import free
@@ -89,7 +89,7 @@ def _free(out: Path, names: tuple[str, ...], kinds: tuple[str, ...]) -> None:
 
 
 def _write(out: Path, name: str, drawn: Mapping[str, Mapping[str, bytes]]) -> list[str]:
-    """Write the pictures of an axis; names of the files."""
+    """Write the figures of an axis; returns the names of the files."""
     from xy_sysid.bags.atomic import whole
 
     out.mkdir(parents=True, exist_ok=True)

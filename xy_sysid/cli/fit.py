@@ -53,7 +53,7 @@ def fit(
     o.output_file("--mat", mat, force)
     samples = o.period_from(period)
     way = Method(method, weighting, domain)
-    way.structure(settings)  # refuses what makes no sense, before any work is done
+    way.structure(settings)  # raises BadInput for invalid combinations, before any work
     measured = measured_responses(recs, reading, averages)
     if measured is not None:
         done, problems = each(tuple(measured), lambda name: _of_response(name, band_of(measured[name], settings), settings, way))
@@ -93,7 +93,7 @@ def fit(
 
 
 def _of_response(name: str, response: FrequencyResponse, settings: IdentifierSettings, way: Method) -> tuple[AxisEstimate, Fit, Validation]:
-    """One axis of a file that holds a response and no samples."""
+    """One axis of a file with a response and without samples."""
     from xy_sysid.fitting.of_given_response import settings_for
     from xy_sysid.fitting.of_recording import AxisEstimate
     from xy_sysid.fitting.of_run import fit_response
@@ -160,6 +160,6 @@ def _show(found: AxisEstimate, result: Fit, verdicts: Validation) -> None:
         say(f"  {left}." if verdicts.trustworthy else f"  NOT TRUSTWORTHY: {left}; take them as orders of magnitude.")
     for check in verdicts.verdicts:
         say(f"  {'ok  ' if check.ok else 'WARN'} {check.sentence}")
-    for note in found.notes:  # the warnings of the fit are among the verdicts
+    for note in found.notes:  # warnings of the fit are in the verdicts
         say(f"axis {found.axis}: {note}", aside)
     say()

@@ -26,7 +26,7 @@ Follow = Annotated[
         help="estimate this effect in every recording, even where it is not found, so that its trend is complete (may be repeated)",
     ),
 ]
-EVERY = 30.0  # s between two lines where no terminal shows a bar
+EVERY = 30.0  # s between two lines of progress without a terminal
 
 
 @reads

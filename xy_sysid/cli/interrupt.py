@@ -1,6 +1,6 @@
-"""Ctrl-C and SIGTERM always end a command: an interrupt that was swallowed is raised again.
+"""Ctrl-C and SIGTERM always end a command: a lost interrupt is raised again.
 
-Python raises KeyboardInterrupt wherever it is at that moment. In a callback of its own (of a weak reference, in the middle of an import)
+Python raises KeyboardInterrupt in the code that runs at that moment. In an internal callback (of a weak reference, during an import)
 it is printed and ignored, and the command would continue.
 """
 
@@ -11,13 +11,13 @@ import signal
 import sys
 from types import FrameType, TracebackType
 
-AGAIN = 0.2  # s from an interrupt to the next, as long as it is not on its way through the program
+AGAIN = 0.2  # s between repetitions of an interrupt that is not being handled
 
 
 class Interrupts:
-    """Within it, SIGINT and SIGTERM raise KeyboardInterrupt until it is left.
+    """Context in which SIGINT and SIGTERM raise KeyboardInterrupt, again and again until it ends.
 
-    came: one did; terminated: a SIGTERM was one of them; code: the exit code, once it is known
+    came: True after an interrupt; terminated: True after a SIGTERM; code: the exit code, once it is known
     """
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class Interrupts:
         self._hook = sys.unraisablehook
         sys.unraisablehook = self._forgotten
         signal.signal(signal.SIGALRM, self._again)
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else the shell wants it ignored
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # otherwise the shell has requested to ignore it
             signal.signal(signal.SIGINT, self._first)
         if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
             signal.signal(signal.SIGTERM, self._first)
@@ -38,10 +38,10 @@ class Interrupts:
         sys.unraisablehook = self._hook
 
     def leave(self) -> None:
-        """All is done and said, and others' last acts are behind: end, with nothing more to be interrupted.
+        """End the process with the exit code; called after all output and all other exit handlers.
 
-        To free piece by piece what numba and scipy hold would take a third of a second; and an interrupt that came in the middle of an
-        ``exec`` (every dataclass is made by one) would make ``python -m`` end by SIGINT, whatever the exit code and whoever caught it.
+        A normal exit would take a third of a second to free the memory of numba and scipy. And after an interrupt within an
+        ``exec`` (every dataclass uses one), ``python -m`` would end by SIGINT although the interrupt was caught.
         """
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
@@ -55,7 +55,7 @@ class Interrupts:
         raise KeyboardInterrupt
 
     def _again(self, number: int, frame: FrameType | None) -> None:
-        """What is half written may be cleared away in peace: while an interrupt is being handled, there is no other."""
+        """Raise the interrupt again, unless one is being handled: partial files are then removed without interruption."""
         error = sys.exc_info()[1]
         while error is not None:
             if isinstance(error, KeyboardInterrupt):
@@ -64,6 +64,6 @@ class Interrupts:
         raise KeyboardInterrupt
 
     def _forgotten(self, lost: sys.UnraisableHookArgs) -> None:
-        """No traceback for an interrupt that comes again."""
+        """Print no traceback for an interrupt, which is raised again."""
         if not issubclass(lost.exc_type, KeyboardInterrupt):
             self._hook(lost)

@@ -22,7 +22,7 @@ Gear = Annotated[
 
 
 def mechanics_table(figures: Iterable[Figure], units: Units, drive: Transmission) -> None:
-    """The parameters in SI, at the joint or table and at the motor; nothing where they are not known."""
+    """Print the parameters in SI, at the joint or table and at the motor; nothing if they are unknown."""
     from xy_sysid.axis.mechanics import mechanics
 
     found = mechanics(figures, units, drive)

@@ -1,4 +1,4 @@
-"""Subscribes to the topics of the identifier and drives the lifecycle of the excitation: all that the demo shows comes over DDS."""
+"""Subscribes to the topics of the identifier and controls the lifecycle of the excitation; all results of the demo arrive over DDS."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
 from xy_sysid.nodes.convert import array_from_ros
 from xy_sysid.nodes.wall import Wall
 
-LISTENERS = 3  # voltage is heard by the machine, position by the excitation, and both by identifier and diagnoser
-QUIET = 1.0  # s without a new result after which the last one has been heard
+LISTENERS = 3  # subscribers of voltage: machine, identifier, diagnoser; of position: excitation, identifier, diagnoser
+QUIET = 1.0  # s without a new result after which the last one has arrived
 
 
 class Monitor:
-    """One node that hears results and statuses; call ``spin`` often."""
+    """A node that receives results and statuses; call ``spin`` often."""
 
     def __init__(self, axes: tuple[str, ...], listeners: int = LISTENERS) -> None:
         self._listeners = listeners
@@ -64,7 +64,7 @@ class Monitor:
                 self.changed = time.monotonic()
 
     def others(self, seconds: float = 1.5) -> list[str]:
-        """Who else reads or writes the machine's topics in this domain."""
+        """Names of other nodes that use the machine's topics in this domain; seconds: time for discovery."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             self._executor.spin_once(timeout_sec=0.1)
@@ -75,7 +75,7 @@ class Monitor:
         return sorted(set(found))
 
     def spin(self, seconds: float) -> None:
-        """Hear what there is."""
+        """Receive messages for this time, s."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
@@ -85,7 +85,7 @@ class Monitor:
         return self._node.create_client(kind, service)
 
     def start_when_ready(self) -> None:
-        """Configure and activate the excitation once everybody hears everybody: discovery can take seconds."""
+        """Configure and activate the excitation once all nodes are connected: discovery can take seconds."""
         if not self._wanted or "streams" not in self.statuses or not self._client.service_is_ready():
             return
         for name in ("excitation", "ballscrew"):
@@ -100,18 +100,18 @@ class Monitor:
             self._call = self._client.call_async(ChangeState.Request(transition=Transition(id=self._wanted[0])))
 
     def over(self) -> bool:
-        """The excitation has ended and the last results have been heard."""
+        """True if the excitation has ended and the last results have arrived."""
         state = self.statuses.get("excitation", (0, "", {}))[2].get("state", "")
         return state == "stopped" and time.monotonic() - self.changed > QUIET
 
     def close(self) -> None:
-        """Leave."""
+        """Remove the node from the graph."""
         self._node.destroy_node()
         self._context.try_shutdown()
 
 
 def refuse_others(monitor: Monitor) -> None:
-    """Raises BadInput when a machine is there already, which might be a real one; the monitor is closed then."""
+    """Raises BadInput, and closes the monitor, if another machine is in this domain: it might be a real one."""
     others = monitor.others()
     if others:
         monitor.close()

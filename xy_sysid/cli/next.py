@@ -1,4 +1,4 @@
-"""xy-sysid next: which experiment answers what the recordings leave open?"""
+"""xy-sysid next: the experiment that distinguishes the effects that the recordings do not."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from xy_sysid.samples.recording import Run
     from xy_sysid.settings import ExcitationSettings
 
-NOTHING = "nothing"  # is known
-POINTS = 100.0  # a second, of a trajectory
+NOTHING = "nothing"  # value of --for if the axis is unknown
+POINTS = 100.0  # points per second of a trajectory
 Between = Annotated[
     list[str] | None,
     typer.Option("--between", metavar="EFFECTS", help="a set of effects to compare, for example a+b, or rigid; repeat it for each set"),
@@ -129,7 +129,7 @@ def next_(
 
 
 def _write_trajectory(answer: NextExperiment, found: Answer, runs: tuple[Run, ...], known: Library, to: Path) -> None:
-    """The motion of the experiment as the first of its sets predicts it, or the diagnosed model; the joint has the name of the axis."""
+    """Write the motion of the experiment, as predicted by the first of its sets or the diagnosed model; the joint has the name of the axis."""
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.diagnosis.of_run import refine
     from xy_sysid.experiment_design.as_trajectory import as_trajectory
@@ -142,7 +142,7 @@ def _write_trajectory(answer: NextExperiment, found: Answer, runs: tuple[Run, ..
 
 
 def _replayed(folder: Path, effect_file: list[Path] | None, json: bool) -> int:
-    """Print every step as its bags decide it; 1 where one differs from what was decided then."""
+    """Print every step as now decided from its bags; returns 1 if one differs from the earlier decision."""
     from xy_sysid.files.effects import library
     from xy_sysid.files.walk import replayed
 
@@ -156,7 +156,7 @@ def _replayed(folder: Path, effect_file: list[Path] | None, json: bool) -> int:
 
 
 def _answered(answer: NextExperiment, output: Path | None, json: bool, notes: list[str]) -> None:
-    """Write the file, and say what was found. notes: of the recordings."""
+    """Write the file, and print the result. notes: of the recordings."""
     from xy_sysid.files.experiment import document, write_experiment
 
     if output is not None and answer.experiment is not None:
@@ -169,7 +169,7 @@ def _answered(answer: NextExperiment, output: Path | None, json: bool, notes: li
 
 
 def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[str, Any]], rms: float | None, seconds: float) -> NextExperiment:
-    """For an unknown axis with the limits of a run file, or with those that were typed."""
+    """The first experiment for an unknown axis, with the limits of a run file or of the options."""
     from xy_sysid.experiment_design.first import first_experiment
     from xy_sysid.experiment_design.limits import MachineLimits
 
@@ -214,7 +214,7 @@ def _show(answer: NextExperiment, output: Path | None) -> None:
 
 
 def sets_of(between: list[str] | None) -> list[tuple[str, ...]]:
-    """The sets of --between; raises BadInput for one alone."""
+    """The sets of --between; raises BadInput for a single one."""
     if between is None:
         return []
     if len(between) < 2:
@@ -223,7 +223,7 @@ def sets_of(between: list[str] | None) -> list[tuple[str, ...]]:
 
 
 def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, acceleration: float | None) -> dict[str, Any]:
-    """MachineLimits by name, SI, from what a person typed."""
+    """MachineLimits by name, SI, from the options."""
     scale = readable(unit)[0]
     asked: dict[str, Any] = {}
     if travel:
@@ -240,7 +240,7 @@ def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, a
 
 
 def _settings(run_file: Path | None, axis: str) -> tuple[Mapping[str, Any], ExcitationSettings]:
-    """What a parameter file tells the excitation, and its settings with that for one axis."""
+    """The excitation's parameters in a parameter file, and its settings for one axis with them."""
     from xy_sysid.settings import ExcitationSettings, changed, for_axes, knobs
 
     told: Mapping[str, Any] = o.told_to("excitation", run_file).parameters if run_file is not None else {}
@@ -250,7 +250,7 @@ def _settings(run_file: Path | None, axis: str) -> tuple[Mapping[str, Any], Exci
 
 
 def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
-    """MachineLimits of the excitation in a parameter file."""
+    """MachineLimits from the excitation's parameters in a parameter file."""
     from xy_sysid.experiment_design.limits import of_settings
 
     if run_file is None:

@@ -1,4 +1,4 @@
-"""Options that commands share, and what they mean."""
+"""Options that commands share, and their values."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ def settings_from(params: Path | None, pairs: list[str] | None) -> IdentifierSet
 
 
 def axes_from(params: Path | None) -> tuple[str, ...]:
-    """The axes that a parameter file gives the identifier; none if it does not."""
+    """The identifier's axes in a parameter file; empty if it names none."""
     found = told_to("identifier", params).parameters.get("axes", []) if params is not None else []
     return tuple(map(str, found)) if isinstance(found, list) else ()
 
 
 def told_to(kind: str, params: Path) -> Told:
-    """What a ROS parameter file or a run file tells a kind of node; no parameters where a parameter file does not speak of it."""
+    """The settings of a kind of node in a ROS parameter file or a run file; no parameters if a parameter file does not contain it."""
     from xy_sysid.files.ros_parameters import parameters
     from xy_sysid.processes.run_plan import Told, is_run_file, told
 
@@ -78,7 +78,7 @@ def told_to(kind: str, params: Path) -> Told:
 
 
 def values_from(pairs: list[str] | None, option: str, example: str, cls: type[Settings]) -> dict[str, Any]:
-    """Values by name from NAME=VALUE pairs, as text: the settings turn each into the type that they declare."""
+    """Values by name from NAME=VALUE pairs, as text; the settings convert each to its declared type."""
     values: dict[str, Any] = {}
     for pair in pairs or []:
         name, equals, text = (part.strip() for part in pair.partition("="))
@@ -91,14 +91,14 @@ def values_from(pairs: list[str] | None, option: str, example: str, cls: type[Se
 
 
 def ros_domain() -> None:
-    """Raises BadInput for a ROS_DOMAIN_ID that ROS would refuse with many words."""
+    """Raises BadInput for a ROS_DOMAIN_ID that ROS does not accept."""
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
     if not (text.isascii() and text.isdigit() and int(text) <= LARGEST_DOMAIN):
         raise BadInput("ROS_DOMAIN_ID", repr(text), f"0 to {LARGEST_DOMAIN}", "Set it, or leave it unset for 0.")
 
 
 def output_file(option: str, path: Path | None, force: bool) -> None:
-    """Raises BadInput, before any work is done, when a file cannot be written, or would replace one without --force."""
+    """Raises BadInput, before any work, if a file cannot be written, or would replace one without --force."""
     if path is None:
         return
     from xy_sysid.files.unasked import free
@@ -117,7 +117,7 @@ def output_file(option: str, path: Path | None, force: bool) -> None:
 
 
 def new_bag(path: Path | None) -> None:
-    """Raises BadRecording where something is there already: a bag never replaces anything."""
+    """Raises BadRecording if the path exists: a bag never replaces anything."""
     from xy_sysid.bags.atomic import taken
 
     if path is not None and taken(path):
@@ -125,14 +125,14 @@ def new_bag(path: Path | None) -> None:
 
 
 def read_text(path: Path) -> str:
-    """A text file; raises BadRecording in one line when it cannot be read."""
+    """The content of a text file; raises BadRecording in one line if it cannot be read."""
     from xy_sysid.bags.opening import text_of
 
     return text_of(path, "a parameter file")
 
 
 def period_from(text: str) -> int | None:
-    """0 for auto, None for none, or the number."""
+    """The value of --period: 0 for auto, None for none, or the number of samples."""
     if text == "auto":
         return 0
     if text == "none":

@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 
 PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 POWER = re.compile("^·10")
-NARROW = 40  # columns below which nothing is broken
+NARROW = 40  # least width of wrapped text, columns
 COMPILING = "compiling the effect laws, once on this machine: about 20 s"
-TEXT = ("unit", "in words")  # columns
+TEXT = ("unit", "in words")  # columns with left-aligned text
 
 
 class Terminal(Console):
-    """Leaves it to the command line what happens when the reader of a pipe goes away."""
+    """A console that raises ReaderGone if the reader of a pipe has closed it."""
 
     def on_broken_pipe(self) -> None:
-        """Called by rich, which would end the process itself."""
+        """Called by rich, whose default ends the process."""
         raise ReaderGone
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
-        """The renderer of rich; text from outside cannot control the terminal."""
+        """The renderer of rich; text from files cannot control the terminal."""
         for part in super().render(renderable, options):
             yield part if part.control else Segment(printable(part.text), part.style)
 
@@ -50,7 +50,7 @@ aside = Terminal(stderr=True, highlight=False, soft_wrap=True, markup=False, emo
 
 
 def plain(value: Any) -> Any:
-    """The value in JSON's own types: arrays as lists, complex numbers as [real, imag], not finite as null."""
+    """The value in JSON types: arrays as lists, complex numbers as [real, imag], non-finite numbers as null."""
     if is_dataclass(value) and not isinstance(value, type):
         return {item.name: plain(getattr(value, item.name)) for item in fields(value)}
     if isinstance(value, Mapping):
@@ -71,7 +71,7 @@ def plain(value: Any) -> Any:
 
 
 def emit(document: Mapping[str, Any]) -> None:
-    """The one JSON document of a command."""
+    """Print the JSON document of a command."""
     try:
         sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\n")
         sys.stdout.flush()
@@ -80,7 +80,7 @@ def emit(document: Mapping[str, Any]) -> None:
 
 
 def say(text: str = "", to: Terminal = people, style: str | None = None) -> None:
-    """Text wrapped at the width of the terminal; continuation lines are indented."""
+    """Print text, wrapped at the width of the terminal; continuation lines are indented."""
     for line in text.split("\n"):
         inset = " " * (len(line) - len(line.lstrip()) + 2)
         broken = textwrap.wrap(line, max(to.width, NARROW), subsequent_indent=inset, break_long_words=False, break_on_hyphens=False)
@@ -89,13 +89,13 @@ def say(text: str = "", to: Terminal = people, style: str | None = None) -> None
 
 
 def say_refused(refused: Mapping[str, str], before: str = "") -> None:
-    """Why axes have no answer. before: words before each reason."""
+    """Print why axes have no answer. before: words before each reason."""
     for name, text in refused.items():
         say(f"axis {name}: {before}{text}")
 
 
 def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
-    """A table on stdout; the first column and those of TEXT are text, the others are figures."""
+    """Print a table on stdout; the first column and those of TEXT are text, the others are numbers."""
     made = Table(title=title, title_justify="left", title_style="bold", header_style="bold", box=None, pad_edge=False)
     for number, name in enumerate(columns):
         made.add_column(name, justify="left" if number == 0 or name in TEXT else "right", overflow="fold", no_wrap=number == 0)
@@ -105,13 +105,13 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> 
 
 
 def estimates(title: str, items: Iterable[Interval]) -> None:
-    """Values with their 95 % intervals, in display units."""
+    """Print values with their 95 % intervals, in display units."""
     rows = [estimate(item.name, (item.value, item.low, item.high), item.unit) for item in items]
     table(title, ("parameter", "value", "95 % interval", "unit"), rows)
 
 
 def estimate(name: str, figures: tuple[float, float, float], unit: str) -> tuple[str, str, str, str]:
-    """Name, value, interval and unit of one parameter, with as many figures as the interval is worth; figures: value and both ends."""
+    """Name, value, interval and unit of one parameter, with the significant digits of its interval; figures: value and both ends."""
     from xy_sysid.report.words import interval_parts, possible
 
     scale, shown = readable(unit)

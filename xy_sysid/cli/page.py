@@ -1,4 +1,4 @@
-"""xy-sysid page: the live page, or one on recordings."""
+"""xy-sysid page: the page, live or of recordings."""
 
 from __future__ import annotations
 
@@ -90,12 +90,12 @@ def page(
 
 
 def reading(topics: list[str] | None, effort: bool, effect_files: list[Path] | None, tables: Mapping[str, list[str]] | None = None) -> Reading:
-    """How recordings are read, for the page and for the reports that it makes; tables: options of tables as they were given. Raises BadInput."""
+    """How recordings are read, for the page and its reports; tables: the options for tables. Raises BadInput for invalid options."""
     from xy_sysid.files.effects import library
     from xy_sysid.page.orders import Reading
     from xy_sysid.page.orders import tables as table_arguments
 
-    library(effect_files or [])  # whatever is wrong with them is said here
+    library(effect_files or [])  # raises BadInput for invalid files
     given = {option: texts for option, texts in (tables or {}).items() if texts}
     load: dict[str, Any] = {**o.topics_from(topics), **({"effort_as_voltage": True} if effort else {}), **table_arguments(given)}
     words = [word for topic in topics or [] for word in ("--topic", topic)] + ["--effort"] * effort
@@ -105,5 +105,5 @@ def reading(topics: list[str] | None, effort: bool, effect_files: list[Path] | N
 
 
 def display() -> bool:
-    """Whether there is a display."""
+    """True if there is a display."""
     return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

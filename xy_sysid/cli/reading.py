@@ -48,7 +48,7 @@ def reading_from(
     effort_lag: o.EffortLag = 0,
     velocity: o.Velocity = False,
 ) -> Reading:
-    """What the options of reading say; they are these parameters."""
+    """The options for reading; they are the parameters of this function."""
     from xy_sysid.imports.reading import Reading, numbers, pairs
 
     start, stop = o.span_from(span)
@@ -69,7 +69,7 @@ def reading_from(
 
 
 def reads(command: Command) -> Command:
-    """Give a command the options of reading, in the place of its parameter ``reading``."""
+    """Decorate a command: its parameter ``reading`` is replaced by the options for reading."""
     own, options = inspect.signature(command), inspect.signature(reading_from)
     hints: dict[str, Any] = {}
     for function in (command, reading_from):
@@ -91,7 +91,7 @@ def reads(command: Command) -> Command:
 
 
 def read_each(paths: Sequence[Path], reading: Reading, quiet: bool) -> tuple[Recording, ...]:
-    """The recordings; their notes go to stderr unless ``quiet``: then the document has them."""
+    """The recordings; their notes go to stderr unless ``quiet``, in which case the document contains them."""
     from xy_sysid.imports.several import read_all
     from xy_sysid.jit import tell_compiling
 
@@ -107,21 +107,21 @@ def read_each(paths: Sequence[Path], reading: Reading, quiet: bool) -> tuple[Rec
 
 
 def read(paths: Sequence[Path], reading: Reading, quiet: bool) -> Recording:
-    """The recordings as one, with a gap between each and the next."""
+    """The recordings joined to one, with a gap between consecutive ones."""
     from xy_sysid.imports.several import joined
 
     return joined(read_each(paths, reading, quiet))
 
 
 def notes_of(recordings: Sequence[Recording], names: Sequence[str] = ()) -> list[str]:
-    """What was noted as they were read, and what of these axes no model is fitted to."""
+    """Notes from reading, and on the data of these axes that no fit uses."""
     return [note for recording in recordings for note in (*recording.notes, *recording.left_out(names))]
 
 
 def measured_responses(paths: Sequence[Path], reading: Reading, averages: float | None = None) -> dict[str, FrequencyResponse] | None:
-    """The responses by axis where a file holds a measured frequency response and no samples, or is said to; None where it does not.
+    """The responses by axis of a file with a measured frequency response instead of samples; None for any other file.
 
-    averages: independent windows behind its coherence
+    averages: number of independent windows of its coherence
     """
     from xy_sysid.imports.registry import format_of, sheet_of
     from xy_sysid.imports.response_file import responses
@@ -134,11 +134,11 @@ def measured_responses(paths: Sequence[Path], reading: Reading, averages: float 
             raise BadInput("frequency responses", f"{len(paths)} files", "one", "Fit them one by one.")
         return responses(paths[0], sheet_of(paths[0], kinds[0]), reading, {} if averages is None else {"averages": averages})
     except OSError:
-        return None  # said by whoever reads it as a recording
+        return None  # reported when it is read as a recording
 
 
 def runs_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
-    """The stretches of an axis in all recordings. Raises BadInput where these do not belong together, or hold one move only."""
+    """The stretches of an axis in all recordings. Raises BadInput if they do not belong together, or hold only one move."""
     from xy_sysid.diagnosis.of_run import runs_together
     from xy_sysid.samples.moves import several_moves
 
@@ -148,19 +148,19 @@ def runs_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
 
 
 def stretches_of(recordings: Sequence[Recording], axis: str) -> tuple[Run, ...]:
-    """Every stretch of an axis in all recordings, however short. Raises BadInput where these do not belong together."""
+    """Every stretch of an axis in all recordings, also short ones. Raises BadInput if they do not belong together."""
     from xy_sysid.diagnosis.of_run import runs_together
 
     return runs_together([run for recording in recordings for run in recording.every_stretch(axis)])
 
 
 def named(paths: Sequence[Path]) -> str:
-    """The recordings in a word."""
+    """The names of the recordings, in one text."""
     return ", ".join(map(str, paths))
 
 
 def chosen(recording: Recording, axes: Sequence[str] | None) -> tuple[str, ...]:
-    """The axes asked for; raises BadInput for one that is not there."""
+    """The requested axes, or all; raises BadInput for an unknown one."""
     for name in axes or []:
         if name not in recording.axes:
             raise BadInput("--axis", repr(name), ", ".join(recording.axes), "Choose one of these.")
@@ -168,9 +168,9 @@ def chosen(recording: Recording, axes: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def each(names: tuple[str, ...], work: Callable[[str], Found], doing: str = "") -> tuple[dict[str, Found], dict[str, str]]:
-    """What ``work`` finds for each axis, and why there is nothing for the others; raises the first refusal if no axis has an answer.
+    """Results of ``work`` by axis, and for the other axes the error in words; raises the first error if no axis has a result.
 
-    doing: what the progress bar says of an axis, as "refining "
+    doing: text of the progress bar before the name of an axis, such as "refining "
     """
     found: dict[str, Found] = {}
     refusals: dict[str, BadInput] = {}

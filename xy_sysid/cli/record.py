@@ -56,7 +56,7 @@ def _arguments(values: dict[str, Any], namespace: str) -> list[str]:
 
 
 def _run(arguments: list[str]) -> int:
-    """The recorder in this process: Ctrl-C is a wish to end it, and not an error."""
+    """Run the recorder in this process; Ctrl-C ends it without an error."""
     from xy_sysid.nodes.run import maker, run_node
 
     return run_node(maker("xy_sysid.nodes.recorder_node:RecorderNode"), ["recorder", *arguments])

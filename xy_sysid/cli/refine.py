@@ -1,4 +1,4 @@
-"""xy-sysid refine: add effects, refit, watch the error fall."""
+"""xy-sysid refine: add effects, refit, and print the falling error."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def refine(
         runs = runs_of(recordings, name)
         run, effort = runs[0], Effort(MOST_EFFECTS if auto else 0, math.inf if budget is None else budget, time.process_time)
         found = refined(runs, tuple(add or ()), known, effort, tolerance)
-        if not found.final.one_step and len(runs) == 1:  # free simulation says nothing about those
+        if not found.final.one_step and len(runs) == 1:  # free simulation cannot judge the others
             if simulate_alone:
                 data = prepare(run.sampling_rate, run.voltage, run.position, tolerance, run.units)
                 found = replace(found, settled=Rung.of(settled(data, found.final)))
@@ -120,7 +120,7 @@ def refine(
 
 
 def verdict(found: Answer) -> str:
-    """The contract's word."""
+    """The verdict in the JSON document: explained, partly, or not_in_library."""
     from xy_sysid.hypotheses.criteria import AT_FLOOR
     from xy_sysid.story.standing import nearer
 

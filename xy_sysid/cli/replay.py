@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from xy_sysid.samples.joint_fields import JointOutput
     from xy_sysid.units import Units
 
-OF_DIAGNOSER = ("memory", "minimum", "tolerance", "effect_files")  # settings of the live diagnoser that a diagnosis of a whole bag heeds
+OF_DIAGNOSER = ("memory", "minimum", "tolerance", "effect_files")  # settings of the live diagnoser that also apply to a full bag
 
 
 def replay(

@@ -1,4 +1,4 @@
-"""xy-sysid report: everything about a recording in one page."""
+"""xy-sysid report: all results of a recording in one page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""xy-sysid simulate: a recording of the simulated machine, made as the live nodes would make it."""
+"""xy-sysid simulate: a recording of the simulated machine, as the live nodes would make it."""
 
 from __future__ import annotations
 

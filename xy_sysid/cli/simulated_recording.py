@@ -1,4 +1,4 @@
-"""A recording of the simulated machine, made as the live nodes would make it: what ``xy-sysid simulate`` and a notebook share."""
+"""A recording of the simulated machine, as the live nodes would make it; for ``xy-sysid simulate`` and notebooks."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def simulate(
 
     duration: s; hidden: draw an effect for each axis from this seed; effects: each as ``[axis:]name[=size][,parameter=value]``
     machine:  a file, or a name in config/machines; seed: of the noise; excite: of every axis, for example kind="multisine", rms=0.5
-    Raises BadInput for what the machine does not know.
+    Raises BadInput for an unknown machine, effect or setting.
     """
     if not 0.0 < duration <= 1e6:
         raise BadInput("duration", f"{duration} s", "above 0, up to 1e6 s", "Give seconds of data.")

@@ -1,4 +1,4 @@
-"""xy-sysid run: start the nodes that a file names, and watch them."""
+"""xy-sysid run: start the nodes of a run file, and monitor them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def run(
 
 
 def first_run(specs: Sequence[ProcessSpec], say: Callable[[str], None]) -> dict[str, Any]:
-    """Start the nodes, find out by small pushes what the machine is, stop them; the answer as JSON has it."""
+    """Start the nodes, measure the machine with small steps, and stop the nodes; returns the JSON document."""
     import threading
 
     from xy_sysid.nodes.first_run import Conductor

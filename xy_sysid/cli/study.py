@@ -1,4 +1,4 @@
-"""xy-sysid study: the paper's figures and tables of any recording, as one page."""
+"""xy-sysid study: the figures and tables of the paper for any recording, as one page."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _same_machine(first: Recording, second: Recording, names: tuple[str, ...]) -
 
 
 def _any(studies: dict[str, AxisStudy]) -> None:
-    """A page without one response would show nothing: say why instead."""
+    """Raises BadInput with the reason if no axis has a response: the page would be empty."""
     from xy_sysid.errors import BadInput
 
     if all(one.frf is None for one in studies.values()):

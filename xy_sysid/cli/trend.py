@@ -1,4 +1,4 @@
-"""xy-sysid trend: which axis changed, since when, by how much, how certainly, and why."""
+"""xy-sysid trend: changed axes, with date, size, certainty and likely cause."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from xy_sysid.fleets.trends import Event, Moved, Trend, Trends
     from xy_sysid.imports.reading import Reading
 
-SHOWN = 12  # parameters whose spread is told
+SHOWN = 12  # parameters whose spread is printed
 
 
 @reads

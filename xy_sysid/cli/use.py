@@ -91,7 +91,7 @@ def use(
             except BadInput as problem:
                 if to and target in to:
                     refused[f"{name} to {target}"] = str(problem)
-                else:  # --to all writes what it can
+                else:  # --to all skips targets that are not possible
                     say(f"axis {name} to {target}: {problem}", aside)
     binary = sorted({target for axis in files.values() for target, item in axis.items() if item.archive or item.mat})
     if binary and out is None:
@@ -116,7 +116,7 @@ def use(
 
 
 def _models(paths: list[Path], effect_file: list[Path] | None, axes: Sequence[str] | None) -> dict[str, PhysicalModel]:
-    """The models with physical effects, by axis; of several files the file's name goes before it."""
+    """The models with physical effects, by axis; with several files, the file's name precedes the axis."""
     from xy_sysid.comparison.physical_model import PhysicalModel
     from xy_sysid.errors import BadInput
     from xy_sysid.files.effects import library
@@ -140,7 +140,7 @@ def _run(recording: Recording | None, model: PhysicalModel) -> Any:
 
 
 def _write(folder: Path, files: dict[str, dict[str, Exported]], force: bool) -> list[str]:
-    """Every file of every target into a folder that may be made."""
+    """Write every file of every target to a folder, which is created if needed; returns the paths."""
     from scipy.io import savemat
 
     from xy_sysid.bags.atomic import whole, write_text

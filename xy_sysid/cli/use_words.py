@@ -97,7 +97,7 @@ def show(name: str, used: Used) -> None:
 
 
 def _show_feedback(name: str, used: Used, loop: Feedback) -> None:
-    """Gains, with a filter in the loop too where it reaches more; margins, and what the bandwidth costs."""
+    """Print gains, with a filter in the loop if it allows a higher bandwidth; margins, encoder noise, and further limits."""
     units = used.model.units
     loops = [loop, *([used.filtered] if used.filtered is not None else [])]
     rows: list[tuple[str, Callable[[Feedback], str], str]] = [
@@ -158,7 +158,7 @@ def _mode(mode: Swing) -> str:
 
 
 def answer(used: Used) -> dict[str, Any]:
-    """Everything but the model, which has a file of its own, and the paths."""
+    """The JSON document of an axis, without the model, which has its own file, and without the paths."""
     designs = ("friction", "tables", "gap", "modes", "shaper", "shapers", "allowed")
     names = ("sampling_rate", "rate_from", "calculation", "limit", "limit_from", "travel", *designs, "predicted", "tracking")
     found: dict[str, Any] = {name: getattr(used, name) for name in names}

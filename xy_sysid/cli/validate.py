@@ -100,7 +100,7 @@ def validate(
 
 
 def _alone(recording: Recording, axis: str, model: AnyModel) -> dict[str, float]:
-    """Of a model with physical effects: position of the whole record from the input alone, and the part of the motion explained."""
+    """For a model with physical effects: rms error of the position simulated from the input alone, and the explained fraction of the motion."""
     from xy_sysid.comparison.physical_model import PhysicalModel
     from xy_sysid.greybox.open_loop import from_input_alone
 

@@ -1,9 +1,9 @@
-"""Every effect, found by folder: one file, or one folder, is one effect; a name that begins with an underscore is a tool.
+"""All effects of the folder: each file or subfolder is one effect; names with a leading underscore are shared tools.
 
-_scene:          what a guess sees of a recording
-_contract:       what every effect says of itself
-_pole_zero_pair: a resonance as a pair of poles and a pair of zeros
-_binding:        laws in generated text
+_scene:          the measured motion, input of a guess
+_contract:       the description of an effect
+_pole_zero_pair: resonances, with or without zeros
+_binding:        laws in generated source text
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Laws in generated text: their arguments are bound by name."""
+"""Laws in generated source text: their arguments are bound by name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def called(effect: Effect, function: str) -> str:
 
 
 def call(effect: Effect, function: str, words: Mapping[str, str]) -> str:
-    """Text of a call; words: what stands for each argument, the effect's own parameters and states too."""
+    """Source text of a call; words: the text for each argument, including the effect's own parameters and states."""
     return f"{called(effect, function)}({', '.join(words[word] for word in arguments(effect.functions[function]))})"
 
 
@@ -24,5 +24,5 @@ def law_names(effects: Iterable[Effect]) -> dict[str, object]:
 
 
 def law_texts(effects: Iterable[Effect]) -> set[str]:
-    """Source of every module that one of the laws is from: a changed law is never run stale."""
+    """Source of each module that defines one of the laws: with it as cache key, a changed law is compiled again."""
     return {module_text(item) for effect in effects for item in effect.functions.values()}

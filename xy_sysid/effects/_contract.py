@@ -1,4 +1,4 @@
-"""The description of an effect, and the places of the simulation where its law can act.
+"""The description of an effect, and the points of the simulation where its law can act.
 
 A law is an ordinary function of numbers. Its arguments are bound by name: parameters and states of the effect, and
 quantities of the simulation at that moment (``WORDS``). So a law looks like its equation and needs no further code.
@@ -7,12 +7,12 @@ quantities of the simulation at that moment (``WORDS``). So a law looks like its
 |---|---|---|---|
 | base | (none) | | part of every model: gain, delay, pole |
 | input | output(u, t, x) | V | on each held voltage sample, before the delay |
-| state | advance(states, u, v, x, t, h, gain, pole) | V that is left of u, new states | on the voltage in each sub-step |
+| state | advance(states, u, v, x, t, h, gain, pole) | V that acts, new states | on the voltage in each sub-step |
 | force | force(u, v, x, t, gain) | V against the drive | in each sub-step; x is the measured position |
-| friction | level(v, direction) | V, never negative | dry friction: sticks, and zero crossings are found in time |
-| bristle | bend(state, v, h, level), force(state, v, level) | new state; V | takes over all dry friction |
-| motion | section(fs) | b0, b1, b2, a1, a2 | linear section, 1 at 0 Hz, that the motion passes (see ``axis.resonant_loop``) |
-| encoder | error(x) | m | added to what the encoder reads; x is where the axis is, 0 where the encoder shows 0 |
+| friction | level(v, direction) | V, never negative | dry friction with sticking; zero crossings of v are located in time |
+| bristle | bend(state, v, h, level), force(state, v, level) | new state; V | all dry friction acts through it |
+| motion | section(fs) | b0, b1, b2, a1, a2 | linear filter section on the motion, gain 1 at 0 Hz (see ``axis.resonant_loop``) |
+| encoder | error(x) | m | added to the encoder reading; x is the true position, 0 where the encoder shows 0 |
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from xy_sysid.effects._similarity import USUAL, Similarity
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
-USUAL_WITHIN = 2.0  # factor by which sizes of real machines differ from the usual one: two of three are within it
+USUAL_WITHIN = 2.0  # two of three real machines have sizes within this factor of the typical one
 LEAST_START = 0.05  # of the typical value: least start value of a parameter that must not be 0
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -47,10 +47,10 @@ class Companions:
     """Companions of an effect that one-step prediction judges: effects that act together with it and can be removed from the recording.
 
     start, low, high, unit: (k,) start values, bounds and scale of their parameters, SI; positive: (k,) True if fitted as a logarithm
-    undo: gain, delay, pole and the k numbers, and n -> voltage (n,), V; position (n + 1,), m; forces against the drive (2, n), V, at the
+    undo: (gain, delay, pole and the k numbers; n) -> voltage (n,), V; position (n + 1,), m; forces against the drive (2, n), V, at the
           motor and on the table;
-          how much of a sudden change of that position the encoder shows at once
-    similar, swing: how this motion compares with the usual one, and its usual way between two reversals, m
+          fraction of a sudden change of that position that the encoder shows at once
+    similar, swing: ratios of this motion to the reference machine's; typical distance between two reversals, m
     """
 
     start: FloatArray
@@ -92,17 +92,17 @@ class DryFriction:
 
 
 def in_time() -> bool:
-    """Never late."""
+    """Always False: no time limit."""
     return False
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How long a fit by one-step prediction goes on.
+    """When a fit by one-step prediction ends early.
 
-    bar: rms of the held-out innovations of the best that is known without the effect: what cannot come near is given up soon;
+    bar: rms of the held-out innovations of the best known model without the effect; a fit that stays far above it is given up;
          m/s where errors are velocities, m in a task
-    late: then it ends with the best so far
+    late: True once time is up; the fit then ends with its best result so far
     """
 
     bar: float | None = None
@@ -116,7 +116,7 @@ PATIENT = Limits()
 class OneStepTask:
     """Input of a fit by one-step prediction.
 
-    base: start values of gain, delay, pole; noise: of the encoder, m; stages: samples of the first stage, of training, of all
+    base: start values of gain, delay, pole; noise: of the encoder, m; stages: number of samples of the first stage, of training, in total
     companions, dry: effects and dry friction that act together with it
     earlier: an earlier result to start from, without the newest companion
     """
@@ -132,10 +132,10 @@ class OneStepTask:
 
 
 class OneStep(Protocol):
-    """Fits base and effect together by one-step prediction, with any laws of dry friction."""
+    """Fits base and effect together by one-step prediction, with given laws of dry friction."""
 
     def fit(self, task: OneStepTask) -> FilterFit:
-        """The numbers that make the innovations least."""
+        """The fit that minimises the innovations."""
 
     def innovation(self, sampling_rate: float, found: FilterFit, companions: Companions, samples: int) -> FloatArray:
         """(samples,) innovations divided by the noise, with the parameters of an earlier result and the companions at ``companions.start``."""
@@ -151,9 +151,9 @@ class FilterFit:
     innovation:   (n,) measured minus predicted position, one step ahead, m
     without:      (n,) innovations of the same filter (process noise, companions) without the effect, all else refitted, m
     noise:        standard deviation of the encoder, m; runs: number of filter runs
-    process_noise_factor: on the process noise that the filter assumed
-    too_small:    True if the effect found is so small that it is none
-    given_up:     True if it ended early, because it could not come near the bar
+    process_noise_factor: factor on the process noise that the filter assumes
+    too_small:    True if the effect found is too small to count as present
+    given_up:     True if the fit ended early, far above the bar
     """
 
     base: tuple[float, float, float]
@@ -206,9 +206,9 @@ def law(function: Callable[P, R]) -> Callable[P, R]:
 class Parameter:
     """One number of an effect.
 
-    low, high: what a fit may reach, SI; positive: fitted as a logarithm; typical: a usual size (scale of a step, tests); all three on
-    the usual machine, see ``Similarity``
-    per_recording: may differ from one recording of a machine to the next (what it carries that day): each has its own value
+    low, high: bounds of a fit, SI; positive: fitted as a logarithm; typical: a usual size (scale of a step, tests); low, high and typical
+    are those of the reference machine, see ``Similarity``
+    per_recording: each recording of a machine has its own value (its payload, for example)
     """
 
     name: str
@@ -221,30 +221,30 @@ class Parameter:
     per_recording: bool = False
 
     def on(self, similar: Similarity) -> Parameter:
-        """The same with bounds and usual size for another machine."""
+        """The parameter with bounds and typical value scaled to another machine."""
         factor = similar.factor(self.unit)
         return replace(self, low=self.low * factor, high=self.high * factor, typical=self.typical * factor)
 
     @property
     def bounds(self) -> str:
-        """What a fit may reach on the usual machine, in words."""
+        """Bounds of a fit on the reference machine, in words."""
         return f"{self.low:g} to {self.high:g}"
 
     def allows(self, value: float) -> bool:
-        """Whether some machine may have it: a number within its bounds; of what has a unit, any number of the right sign."""
+        """True if a machine may have this value: without a unit, a number within the bounds; with a unit, any finite number of the right sign."""
         return self.low <= value <= self.high if not self.unit else math.isfinite(value) and (value > 0.0 or not self.positive)
 
     @property
     def allowed(self) -> str:
-        """The same in words."""
+        """The allowed values, in words."""
         return f"{self.low:g} to {self.high:g}" if not self.unit else f"above 0 {self.unit}" if self.positive else f"a finite number of {self.unit}"
 
 
 @dataclass(frozen=True, slots=True)
 class Sum:
-    """One law written as several effects.
+    """One law as the sum of several effects.
 
-    parts: their names; joined: values of each part -> the effect's values; apart: the way back
+    parts: their names; joined: values of each part -> the effect's values; apart: the inverse of ``joined``
     """
 
     parts: tuple[str, ...]
@@ -258,7 +258,7 @@ class Effect:
 
     law:         one line of mathematics
     meaning:     what it is on a real machine
-    validity:    where the law holds, and where it does not
+    validity:    conditions under which the law holds
     source:      paper or book, with the equation
     category:    where it acts (table above)
     parameters:  the first one is its size, or its limit or frequency: at zero the effect is absent
@@ -266,7 +266,7 @@ class Effect:
     look_alikes: names of effects that it can be mistaken for; shown to users, without influence on the search
     experiment:  distinguishes it from them
     functions:   the compiled law, by the names of the table above
-    guesses:     its signatures on a scene, with a way to read start values
+    guesses:     its traces on a scene, with functions that read start values from their coefficients
     joint:       start values of base and effect together: (gain, delay beyond the scene's, pole, values of the parameters);
                  for effects so large that the base cannot be fitted alone
     states:      names of the law's states; all start at zero
@@ -274,9 +274,9 @@ class Effect:
     special_of:  the effect of another family that becomes this one at certain values of its parameters
     order:       place among the effects of its category, in the direction of the signal
     simulable:   False if free simulation cannot judge it
-    refusal:     why values do not count on a travel between two positions (m), although each is within its bounds: in words, or empty
+    refusal:     reason to reject values on a travel between two positions (m) although each is within its bounds; empty if there is none
     one_step:    if not simulable, fits the effect by one-step prediction (see ``contact.Contact``)
-    sum_of:      other effects whose sum is the same law, if motor and table move as one
+    sum_of:      other effects whose sum is the same law, if motor and table move together
     straight:    True for a force proportional to speed, with one factor for each direction: it needs no sub-steps
     angular:     True for a law of an angle: it replaces another law only if the position is in rad
     on_table:    True for a force that acts on the table: inside a backlash gap it does not reach the motor
@@ -341,15 +341,15 @@ class Effect:
             raise BadInput(f"effect {self.name}: mode_frequency", repr(self.mode_frequency), ", ".join(self.names), "Name one of these.")
 
     def has_equations_of(self, other: Effect) -> bool:
-        """Both have the same equations, like a flexible base and a flexible screw, so no data distinguish them."""
+        """True if both have the same equations, like a flexible base and a flexible screw, so no data distinguish them."""
         return bool(self.family) and (self.family, self.names, self.law) == (other.family, other.names, other.law)
 
     def is_special_case(self, other: Effect) -> bool:
-        """The other law becomes this one at certain values of its parameters: of one family the one with fewer parameters is taken for it."""
+        """True if the other law becomes this one at certain values; within a family, the law with fewer parameters counts as special case."""
         return self.special_of == other.name or bool(self.family and self.family == other.family and len(self.names) < len(other.names))
 
     def _is_straight(self) -> bool:
-        """Whether it is a force that asks for nothing but speed and base, and is twice as large at twice the speed."""
+        """True for a force that depends only on speed and base, and doubles with the speed."""
         words = {"v": 1.0, "gain": 1.0, "pole": 1.0, **dict(zip(self.names, self.typical, strict=True))}
         if self.category != "force" or not {"v"} <= {*arguments(self.functions["force"])} <= {*words}:
             return False
@@ -364,12 +364,12 @@ class Effect:
 
     @property
     def is_behind(self) -> bool:
-        """True for what changes the motion behind the base, on its way to the encoder: its traces are velocities, not forces."""
+        """True for an effect that changes the motion between base and encoder: its traces are velocities, not forces."""
         return self.category in ("motion", "encoder")
 
     @property
     def can_be_undone(self) -> bool:
-        """True for a section of the motion whose zeros are damped, so that what goes in follows from what comes out."""
+        """True for a section whose zeros are damped, so that its input can be computed from its output."""
         section = self.functions["section"]
         words = {"fs": 2000.0, **dict(zip(self.names, self.typical, strict=True))}
         zeros = np.roots(section(**{name: words[name] for name in arguments(section)})[:3])
@@ -377,17 +377,17 @@ class Effect:
 
     @property
     def is_by_place(self) -> bool:
-        """True for a law that asks where the axis is."""
+        """True for a law that depends on the position."""
         return any("x" in arguments(item) for item in self.functions.values())
 
     @property
     def repeats(self) -> bool:
-        """True for a law by place that repeats along the travel, for one of its parameters is the period; or with each turn."""
+        """True for a position-dependent law that repeats along the travel (it has a period) or with each turn (it is a law of an angle)."""
         return self.is_by_place and ("period" in self.names or self.angular)
 
     @property
     def is_of_the_drag(self) -> bool:
-        """True for a force whose size is a part of the base's own drag."""
+        """True for a force whose size is relative to the base's own drag."""
         return self.category == "force" and {"v", "gain"} <= set(arguments(self.functions["force"]))
 
     @property
@@ -397,17 +397,17 @@ class Effect:
 
     @property
     def typical(self) -> tuple[float, ...]:
-        """A usual size of each parameter, SI."""
+        """Typical value of each parameter on the reference machine, SI."""
         return tuple(parameter.typical for parameter in self.parameters)
 
     def on(self, similar: Similarity) -> tuple[Parameter, ...]:
-        """Its parameters with bounds and usual sizes for another machine."""
+        """Its parameters with bounds and typical values for another machine."""
         return tuple(item.on(similar) for item in self.parameters)
 
     def guessed(self, scene: Scene) -> list[Guess]:
-        """What it guesses from a scene; nothing without ``guesses``.
+        """Its guesses on a scene; empty without ``guesses``.
 
-        Raises BadInput for columns that are not one finite number for each sample, as an effect of one's own may give.
+        Raises BadInput for columns without one finite number for each sample, which a user's own effect may return.
         """
         return scene.kept(self.name, lambda: self._guessed(scene))
 
@@ -426,10 +426,10 @@ class Effect:
         return found
 
     def read(self, guess: Guess, coefficients: FloatArray, similar: Similarity) -> tuple[float, ...]:
-        """The values of the parameters that belong to the coefficients of a guess's columns, within their bounds.
+        """Parameter values for the coefficients of a guess's columns, within their bounds.
 
-        A size of the effect and a parameter in V are at least ``LEAST_START`` times their typical value.
-        Raises BadInput for other than one finite number each, as an effect of one's own may give.
+        The first parameter and those with V in their unit, if positive, are at least ``LEAST_START`` times their typical value.
+        Raises BadInput unless there is one finite number for each parameter, which a user's own effect may violate.
         """
         given = tuple(guess.read(coefficients))
         if len(given) != len(self.parameters) or not all(isinstance(value, (int, float, np.number)) and np.isfinite(value) for value in given):

@@ -1,8 +1,8 @@
-"""A pole-zero pair on the sampled motion: what both resonances share.
+"""Resonances on the sampled motion: a pair of poles with a pair of zeros, or without.
 
 Poles and zeros are mapped by z = exp(s / fs) (matched z-transform; Franklin, Powell & Workman, Digital Control of Dynamic
-Systems, 3rd ed., sec. 6.2.3), with gain 1 at 0 Hz. As the pair lies close together, what the mapping does far above it
-cancels.
+Systems, 3rd ed., sec. 6.2.3), with gain 1 at 0 Hz. Poles and zeros lie close together, so errors of the mapping far above
+them cancel.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from xy_sysid.effects._contract import law
 from xy_sysid.effects._scene import Guess, Scene, columns
 from xy_sysid.samples.block import FloatArray
 
-_DAMPING = 0.03  # of the first guess; real frames and screws have 0.01 to 0.1
-_LIKELY = 4  # frequencies of which the traces are worked out, of those that the spectra show
+_DAMPING = 0.03  # damping ratio of the first guess; real frames and screws have 0.01 to 0.1
+_LIKELY = 4  # most frequencies whose traces are computed
 
 
 @law
@@ -44,13 +44,13 @@ def pair(zero: float, zero_damping: float, pole: float, pole_damping: float, fs:
 
 
 def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
-    """The likeliest pairs with poles between ``low`` and ``high`` (Hz)."""
+    """The most likely pairs with poles between ``low`` and ``high`` (Hz)."""
     for trace, frequency in traces(scene, low, high):
         yield Guess(trace, _Reader(frequency))
 
 
 def traces(scene: Scene, low: float, high: float) -> Iterator[tuple[FloatArray, float]]:
-    """(2, n) traces of the likeliest poles between ``low`` and ``high`` (Hz), and their frequencies; none where sampling is too slow to see one."""
+    """(2, n) traces of the most likely poles between ``low`` and ``high`` (Hz), and their frequencies; none if sampling is too slow."""
     top = min(high, 0.35 * scene.sampling_rate)
     if top <= low:
         return
@@ -59,14 +59,14 @@ def traces(scene: Scene, low: float, high: float) -> Iterator[tuple[FloatArray, 
         w = 2.0 * math.pi * float(frequency)
         c = w / math.tan(0.5 * w / scene.sampling_rate)  # s = c (z - 1) / (z + 1), exact at the pair
         a = np.array([c * c + 2.0 * _DAMPING * w * c + w * w, 2.0 * (w * w - c * c), c * c - 2.0 * _DAMPING * w * c + w * w])
-        poles = scipy.signal.lfilter([1.0], a, model)  # and both numerators of what they make
+        poles = scipy.signal.lfilter([1.0], a, model)  # the two numerators follow
         once, twice = np.append(0.0, poles[:-1]), np.concatenate(((0.0, 0.0), poles[:-2]))
         yield columns(c * c * (poles - 2.0 * once + twice), c * w * (poles - twice)), float(frequency)
 
 
 def _likely(scene: Scene, frequencies: FloatArray) -> FloatArray:
-    """Of these frequencies (Hz) the few at which a pair would take most of the error, beside what gain, delay and pole can, by averaged
-    spectra: what bends counts there as if it were linear."""
+    """The few frequencies (Hz) at which a pair explains most of the error that changes of gain, delay and pole cannot, by averaged
+    spectra, in which nonlinear effects count as linear."""
     f, power, cross, weight = _error_spectra(scene)
     if f.size == 0:
         return frequencies[:_LIKELY]
@@ -83,7 +83,7 @@ def _likely(scene: Scene, frequencies: FloatArray) -> FloatArray:
 
 
 def _error_spectra(scene: Scene) -> tuple[FloatArray, FloatArray, NDArray[np.complex128], FloatArray]:
-    """Frequency (Hz), power of the model's motion, its cross spectrum with the error, and weight, by which each octave counts as much."""
+    """Frequency (Hz), power of the model's motion, its cross spectrum with the error, and a weight that makes octaves count equally."""
     f, seen = _spectra(scene)
     error, model = seen[2], seen[1] - seen[2]
     power, own, cross = _mean(model, model).real, _mean(error, error).real, _mean(model, error)
@@ -117,8 +117,8 @@ def joint(scene: Scene, low: float, high: float) -> Iterator[tuple[float, float,
 
 @dataclass(frozen=True, slots=True)
 class OfResponse:
-    """A base with a pair of poles, as a frequency response shows it: gain, m/s/V; delay beyond the scene's, s; pole, rad/s;
-    frequency (Hz) and damping ratio of the pair, and of the zeros if there are two that swing."""
+    """A base with a pair of poles, fitted to a frequency response: gain, m/s/V; delay beyond the scene's, s; pole, rad/s;
+    frequency (Hz) and damping ratio of the pair, and of the zeros if they are a complex pair."""
 
     gain: float
     delay: float
@@ -129,10 +129,10 @@ class OfResponse:
 
 @lru_cache(maxsize=2)
 def of_response(scene: Scene, zeros: int) -> OfResponse | None:
-    """Three poles and so many zeros, by linear least squares with weights worked out again (Sanathanan & Koerner 1963), for delays on a
-    grid: once for all effects that ask. None where that is no base with a pair of poles."""
+    """Three poles and ``zeros`` zeros, by iteratively reweighted linear least squares (Sanathanan & Koerner 1963), for delays on a
+    grid; cached for all effects. None if the result is not a base with a pair of poles."""
     f, response, weight = _response(scene)
-    if f.size < 4:  # three lines hold the six numbers, more judge them
+    if f.size < 4:  # three complex lines determine six numbers, more are needed to check them
         return None
     scale = 2.0 * math.pi * float(np.sqrt(f[0] * f[-1]))
     s = 2j * math.pi * f / scale
@@ -141,7 +141,7 @@ def of_response(scene: Scene, zeros: int) -> OfResponse | None:
     above = powers[:, 2 - zeros :]
 
     def fitted(delays: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(delays, zeros + 4) numerator and denominator, and (delays,) misfit, for each, s; all at once."""
+        """(delays, zeros + 4) numerator and denominator, and (delays,) misfit, for (delays,) s."""
         target = response * np.exp(np.outer(delays, s * scale)) / box
         matrix = np.concatenate((np.broadcast_to(above, (delays.size, *above.shape)), -target[:, :, None] * powers), axis=2)
         right, denominator, found = target * s**3, np.ones_like(target), np.zeros((delays.size, zeros + 4))
@@ -154,7 +154,7 @@ def of_response(scene: Scene, zeros: int) -> OfResponse | None:
         misfit = np.sum((weight * np.abs(1.0 - found[:, :-3] @ above.T / denominator / target)) ** 2, axis=1)
         return found, np.where(np.isfinite(misfit), misfit, np.inf)
 
-    delays = np.arange(-12.0, 4.01) / scene.sampling_rate  # a rigid base takes a large pair for more delay
+    delays = np.arange(-12.0, 4.01) / scene.sampling_rate  # mostly shorter: a fit without the pair has a longer delay instead
     nearest = delays[int(np.argmin(fitted(delays)[1]))]
     delays = nearest + np.arange(-0.75, 0.76, 0.25) / scene.sampling_rate
     found, misfit = fitted(delays)
@@ -172,7 +172,7 @@ def of_response(scene: Scene, zeros: int) -> OfResponse | None:
 
 
 def _swinging(roots: NDArray[np.complex128]) -> tuple[float, float] | None:
-    """Frequency, Hz, and damping ratio of the one pair among the roots that swings; None if there is none."""
+    """Frequency, Hz, and damping ratio of the complex pair among the roots; None unless there is exactly one."""
     pair_of = roots[roots.imag > 1e-9 * np.abs(roots)]
     if pair_of.size != 1:
         return None
@@ -182,7 +182,7 @@ def _swinging(roots: NDArray[np.complex128]) -> tuple[float, float] | None:
 
 @lru_cache(maxsize=1)
 def _spectra(scene: Scene) -> tuple[FloatArray, NDArray[np.complex128]]:
-    """Frequency (Hz), and (3, windows, lines) of voltage, velocity and error, each Hann window without its mean: up to 2 s, four at least."""
+    """Frequency (Hz), and (3, windows, lines) spectra of voltage, velocity and error, each Hann window without its mean; up to 2 s each."""
     length = int(2 ** np.floor(np.log2(min(2.0 * scene.sampling_rate, scene.voltage.size / 4.0))))
     signals = np.stack((scene.voltage, scene.velocity, scene.error))
     cut = np.lib.stride_tricks.sliding_window_view(signals, length, axis=-1)[:, :: length // 2]
@@ -191,7 +191,7 @@ def _spectra(scene: Scene) -> tuple[FloatArray, NDArray[np.complex128]]:
 
 
 def _mean(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(lines,) cross spectrum of (windows, lines), in no unit."""
+    """(lines,) mean cross spectrum of (windows, lines), without scaling."""
     return np.asarray((one.conj() * other).mean(axis=0))
 
 

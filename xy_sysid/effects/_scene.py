@@ -12,25 +12,25 @@ import scipy
 from xy_sysid.effects._similarity import Similarity
 from xy_sysid.samples.block import FloatArray
 
-USUAL_SWING = 2e-4  # m between two reversals on the usual machine of ``Similarity``
-PLACES = 2048  # along the travel, for what repeats with it
-REPEATS = 1.5  # periods within the travel at least: what is longer acts as a polynomial, and explains anything
-SHORT = 2**16  # samples up to which a scene keeps all columns of its guesses: 50 MB
-FINER = 16  # steps of the period lengths, in parts of a period over the travel: half a step leaves 0.3 % of the power of a sine
+USUAL_SWING = 2e-4  # m between two reversals on the reference machine of ``Similarity``
+PLACES = 2048  # bins along the travel, for periodic traces
+REPEATS = 1.5  # least periods within the travel: a longer wave acts like a polynomial, and explains anything
+SHORT = 2**16  # samples up to which a scene caches the columns of its guesses: 50 MB
+FINER = 16  # grid steps per period within the travel: half a step off misses 0.3 % of the power of a sine
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """One axis in motion, with the base model's view of it; each is its own, so that what is worked out of it can be kept.
+    """Motion of one axis, and its error against the base model. Compared by identity, so that results can be cached.
 
     sampling_rate: Hz; gain: m/s/V; pole: rad/s of the base
-    voltage:  (n,) what arrives at the amplifier (delayed), mean over each sample, V
+    voltage:  (n,) delayed voltage at the amplifier, mean over each sample, V
     velocity: (n,) measured mean velocity of each sample, m/s
     position: (n,) measured, at the middle of each sample, m
     error:    (n,) measured velocity minus the model's, m/s
-    recordings: samples of each recording that it is made of, one after the other; empty for one
-    prompt: the same motion behind a drive that answers at once, where the delay that the base has is so long that it may be astray
-    sections: b0, b1, b2, a1, a2 of each that the motion passes behind the base
+    recordings: number of samples of each recording in it, in sequence; empty for one recording
+    prompt: the same motion with a base without delay; None unless the base's delay is so long that a wrong value would hide traces
+    sections: b0, b1, b2, a1, a2 of each filter section of the motion behind the base
     """
 
     sampling_rate: float
@@ -47,7 +47,7 @@ class Scene:
     _guesses: dict[str, list[Guess]] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def kept(self, name: str, guesses: Callable[[], list[Guess]]) -> list[Guess]:
-        """What an effect guesses: score test and inverse identification both ask, so that it is worked out once if that is no load."""
+        """The guesses of an effect, cached for score test and inverse identification if there are at most ``SHORT`` samples."""
         if self.error.size > SHORT:
             return guesses()
         if name not in self._guesses:
@@ -61,7 +61,7 @@ class Scene:
 
     @property
     def similar(self) -> Similarity:
-        """How this motion compares with the usual one."""
+        """Ratios of this motion to that of the reference machine."""
         return _similar(self)
 
     @property
@@ -70,7 +70,7 @@ class Scene:
         return swing(self.sampling_rate, self.smooth(self.velocity, 300.0), self.velocity)
 
     def smooth(self, signal: FloatArray, cutoff: float) -> FloatArray:
-        """The signal below ``cutoff`` (Hz), without shift in time. Of the scene's own signals each is worked out once."""
+        """The signal below ``cutoff`` (Hz), without phase shift; cached for the scene's own signals."""
         own = next((name for name in ("voltage", "velocity", "error") if signal is getattr(self, name)), None)
         if own is None:
             return self._smoothed(signal, cutoff)
@@ -82,7 +82,7 @@ class Scene:
         return smoothed(self.sampling_rate, signal, cutoff)
 
     def direction(self) -> FloatArray:
-        """(n,) -1..1, the direction of motion, blurred where noise hides it."""
+        """(n,) direction of motion, -1..1: near 0 where noise exceeds the speed."""
         v = self.smooth(self.velocity, 300.0)
         noise = float(np.std(self.velocity - v)) + 1e-12
         return np.asarray(np.tanh(v / noise))
@@ -93,10 +93,10 @@ class Scene:
         return -(np.gradient(e) * self.sampling_rate / self.pole + e) / self.gain
 
     def periods(self, numerator: FloatArray, denominator: FloatArray, count: int = 4, least: float = REPEATS) -> list[float]:
-        """Lengths (m) at which numerator / denominator repeats along the travel, strongest first.
+        """Period lengths (m) of numerator / denominator along the travel, strongest first, at most ``count``.
 
-        Only lengths with ``least`` periods within the travel. At each length a sine is
-        fitted to the places, each counted by the denominator there (Lomb 1976; Zechmeister & Kurster 2009, eq. 5), and less towards the ends.
+        Only lengths with at least ``least`` periods within the travel. At each length a sine is
+        fitted along the travel, weighted by the denominator (Lomb 1976; Zechmeister & Kurster 2009, eq. 5), and less towards the ends.
         """
         low, high = np.quantile(self.position, [0.01, 0.99])
         travel = float(high - low)
@@ -124,12 +124,12 @@ def _similar(scene: Scene) -> Similarity:
 
 
 def smoothed(sampling_rate: float, signal: FloatArray, cutoff: float) -> FloatArray:
-    """(n,) a signal below ``cutoff`` (Hz), without shift in time."""
+    """(n,) a signal below ``cutoff`` (Hz), without phase shift."""
     return np.asarray(scipy.signal.sosfiltfilt(_low_pass(min(2.0 * cutoff / sampling_rate, 0.9)), signal), dtype=np.float64)
 
 
 def swing(sampling_rate: float, smooth: FloatArray, velocity: FloatArray) -> float:
-    """The way (m) between two reversals, in the mean, from a velocity (n,) and the same without its noise (m/s)."""
+    """Mean distance (m) between two reversals, from a velocity (n,) and the same without its noise (m/s)."""
     forth = np.sign(smooth[np.abs(smooth) > float(np.std(velocity - smooth))])
     legs = 1 + int(np.count_nonzero(forth[1:] != forth[:-1]))
     return float(np.sum(np.abs(smooth))) / sampling_rate / legs
@@ -142,12 +142,12 @@ def _low_pass(share: float) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """A trace that an effect would leave, to first order.
+    """The trace of an effect in the error, to first order.
 
-    columns: (k, n) per unit coefficient: V against the drive, or m/s of an effect that acts behind the base (``Effect.is_behind``)
+    columns: (k, n) per unit coefficient: V against the drive, or m/s for an effect behind the base (``Effect.is_behind``)
     read:    start values of all parameters, in order, from the k coefficients that explain the error best
-    inverse_only: a start for base and effect together, and no trace of the effect beside a base that stays
-    whole:   the law is the column as it is, once: its coefficient says how well it fits, and no size (what lies above a limit)
+    inverse_only: True for a start of base and effect together that is not used with a fixed base (score test)
+    whole:   True if the law is the column times 1: its coefficient shows how well it fits, not a size (voltage beyond a limit, for example)
     """
 
     columns: FloatArray

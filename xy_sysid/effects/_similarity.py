@@ -1,8 +1,8 @@
 """Ratios of a motion to that of the reference machine, for which bounds and usual sizes of effects are given.
 
-An axis does the same in metres, radians or encoder counts, driven by volts, amperes or newtons, and slowly or quickly; what is said of
-it must be the same, too (similarity; Barenblatt, Scaling, 2003, ch. 1). So bounds, usual sizes and steps in an effect's file are those
-of one usual machine, and are carried over to another by the units of each parameter.
+A result must not depend on whether an axis is measured in metres, radians or encoder counts, driven by volts, amperes or newtons,
+or slow or fast (similarity; Barenblatt, Scaling, 2003, ch. 1). So bounds, typical values and steps in an effect's file are those
+of one reference machine, and are scaled to another by the unit of each parameter.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import numpy as np
 
 from xy_sysid.samples.block import FloatArray
 
-SPEED, VOLTAGE = 0.025, 1.0  # rms, m/s and V, of the usual machine: a ball-screw table driven with noise
-RATE = 2000.0  # Hz; a machine that is sampled faster is no quicker, one that is sampled more slowly is slower
+SPEED, VOLTAGE = 0.025, 1.0  # rms, m/s and V, of the reference machine: a ball-screw table driven with noise
+RATE = 2000.0  # Hz; a machine with faster sampling is not considered quicker, one with slower sampling is considered slower
 UNIT = re.compile(r"(V|m|s)\^?(\d*)")
 
 
 @dataclass(frozen=True, slots=True)
 class Similarity:
-    """SI units for one of the usual machine.
+    """Size of one unit of the reference machine, in SI units.
 
     length: m; time: s; voltage: V
     """
@@ -33,15 +33,15 @@ class Similarity:
 
     @staticmethod
     def of(sampling_rate: float, voltage: FloatArray, velocity: FloatArray) -> Similarity:
-        """Of a motion: (n,) V, (n,) m/s. What stands still is like the usual machine."""
+        """Ratios of a motion: (n,) V, (n,) m/s. A signal without variation counts as the reference machine's."""
         time = max(1.0, RATE / sampling_rate)
         speed, drive = float(np.std(velocity)) / SPEED, float(np.std(voltage)) / VOLTAGE
         return Similarity(length=(speed or 1.0) * time, time=time, voltage=drive or 1.0)
 
     def factor(self, unit: str) -> float:
-        """SI units for one of the usual machine, for a unit made of V, m and s; 1 for what else there is (rad, numbers).
+        """Ratio to the reference machine for a unit of V, m and s; other units (rad, numbers) give 1.
 
-        Hz stays as it is: what a resonance is called hangs on it, however it is sampled.
+        Hz also gives 1: the name of a resonance depends on its frequency, at any sampling rate.
         """
         volts, lengths, times = _powers(unit)
         return self.voltage**volts * self.length**lengths * self.time**times

@@ -22,7 +22,7 @@ def advance(lag: float, current: float, u: float, h: float) -> tuple[float, floa
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """What a first-order lag of 0.2 to 5 ms takes from the voltage; longer where the sampling is slow."""
+    """Voltage minus lagged voltage, for lags of 0.2 to 5 ms; longer if the sampling is slow."""
     for lag in np.geomspace(0.2e-3, 5e-3, 6) * scene.similar.time:
         left = math.exp(-1.0 / (float(lag) * scene.sampling_rate))
         behind = scipy.signal.lfilter([1.0 - left], [1.0, -left], scene.voltage)
@@ -30,13 +30,13 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 
 def joint(scene: Scene) -> Iterator[tuple[float, float, float, tuple[float, ...]]]:
-    """The base as it is, with so much less delay: what a fit without the lag has taken for one."""
+    """The same base with its delay reduced by the lag, because a fit without the lag counts it as delay."""
     for lag in np.geomspace(0.2e-3, 3.2e-3, 5) * scene.similar.time:
         yield scene.gain, -float(lag), scene.pole, (float(lag),)
 
 
 class _Reader:
-    """The lag from the coefficient of one that was tried."""
+    """The lag from the coefficient of a tested lag."""
 
     def __init__(self, lag: float) -> None:
         self.lag = lag

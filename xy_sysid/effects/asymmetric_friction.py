@@ -16,7 +16,7 @@ def level(asymmetry: float, coulomb: float, direction: float) -> float:
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """The direction of motion, and whether it moves at all."""
+    """The direction of motion, and its magnitude (0 at rest)."""
     direction = scene.direction()
 
     def read(c: FloatArray) -> tuple[float, ...]:
@@ -27,13 +27,13 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 
 def joined(values: Sequence[Sequence[float]]) -> tuple[float, ...]:
-    """The mean level, and the load that makes the difference."""
+    """(coulomb, asymmetry) of a Coulomb level and a load."""
     (coulomb,), (load,) = values
     return coulomb, load / coulomb
 
 
 def apart(values: Sequence[float]) -> tuple[tuple[float, ...], ...]:
-    """The friction both ways, and the load."""
+    """The Coulomb level and the load; the inverse of ``joined``."""
     coulomb, asymmetry = values
     return (coulomb,), (asymmetry * coulomb,)
 

@@ -10,12 +10,12 @@ from xy_sysid.effects._scene import Guess, Scene, columns
 
 @law
 def force(asymmetry: float, v: float, gain: float) -> float:
-    """Force against the drive beyond the base's own drag v / gain, V; negative against the motion where it is less."""
+    """Force against the drive in addition to the base's own drag v / gain, V."""
     return asymmetry * abs(v) / gain
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """The size of the speed, whatever its direction, in volts of the base's own drag."""
+    """The magnitude of the velocity, in volts of the base's own drag."""
     v = scene.smooth(scene.velocity, 300.0)
     yield Guess(columns(abs(v) / scene.gain), lambda c: (float(c[0]),))
 

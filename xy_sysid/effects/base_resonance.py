@@ -9,8 +9,8 @@ from xy_sysid.effects import _pole_zero_pair
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene
 
-LOWEST, HIGHEST = 1.0, 90.0  # Hz, where it is looked for
-SLOW = 0.25  # of the corner frequency of the base, from which on a mode is looked for
+LOWEST, HIGHEST = 1.0, 90.0  # Hz, range of the tested frequencies
+SLOW = 0.25  # lowest tested frequency of a slow axis, relative to the corner frequency of its base
 
 
 @law
@@ -30,7 +30,7 @@ def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]
 
 
 def _lowest(scene: Scene) -> float:
-    """Hz: 5, and lower where the axis is slow itself."""
+    """Lowest tested frequency, Hz: 5, or lower for a slow axis."""
     return max(LOWEST, min(5.0, SLOW * scene.pole / (2.0 * math.pi)))
 
 

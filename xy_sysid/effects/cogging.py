@@ -11,8 +11,8 @@ from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
 from xy_sysid.samples.block import FloatArray
 
-PARTS = (0.5, 0.75, 1.1, 1.6)  # periods on the travel, of a wave that does not repeat there
-LEAST = 0.5  # periods on the travel: within less a wave is a spring, which softens
+PARTS = (0.5, 0.75, 1.1, 1.6)  # periods within the travel, of waves too long to repeat there
+LEAST = 0.5  # least periods within the travel: with less, a wave is a softening spring
 
 
 @law
@@ -22,8 +22,8 @@ def force(amplitude: float, period: float, phase: float, x: float) -> float:
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """Sine and cosine of the lengths at which the missing force repeats along the travel; and of longer ones, of which the travel is a
-    part: beside a base that stays these explain anything, as polynomials do."""
+    """Sine and cosine at the periods of the missing force along the travel; and at longer periods, which are used only for starts of
+    base and effect together: with a fixed base they would explain anything, as polynomials do."""
     missing = scene.missing_force()
     for period in scene.periods(missing, np.ones_like(missing)):
         yield _wave(scene, period)
@@ -38,7 +38,7 @@ def _wave(scene: Scene, period: float, inverse_only: bool = False) -> Guess:
 
 
 def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
-    """A wave of which too little is seen is a spring."""
+    """Rejects a wave with less than ``LEAST`` periods within the travel."""
     seen = (between[1] - between[0]) / values[1]
     return f"only {seen:.2g} of its period are within the travel, at least {LEAST:g} are needed" if seen < LEAST else ""
 

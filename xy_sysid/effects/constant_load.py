@@ -17,7 +17,7 @@ def force(load: float) -> float:
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """One and the same force all the time."""
+    """A constant force."""
     yield Guess(columns(np.ones_like(scene.voltage)), lambda c: (float(c[0]),))
 
 

@@ -13,19 +13,19 @@ from xy_sysid.samples.block import FloatArray
 
 @law
 def output(width: float, u: float) -> float:
-    """What is left of the voltage ``u``, V."""
+    """The voltage behind the dead zone, V."""
     return u - min(max(u, -width), width)
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """The part of the voltage within a zone of 3 to 100 per cent of its rms."""
+    """The voltage clipped to the zone, for half widths of 3 to 100 % of its standard deviation."""
     u = scene.voltage
     for width in np.geomspace(0.03, 1.0, 8) * float(np.std(u)):
         yield Guess(columns(np.clip(u, -width, width)), _Reader(float(width)), whole=True)
 
 
 class _Reader:
-    """The width from the coefficient of a zone that was tried: to first order both shift the voltage alike."""
+    """The width from the coefficient of a tested width, to which it is proportional to first order."""
 
     def __init__(self, width: float) -> None:
         self.width = width

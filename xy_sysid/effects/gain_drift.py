@@ -7,17 +7,17 @@ from collections.abc import Iterator
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
 
-LIMIT = 0.9  # largest change: a drive neither stops nor doubles by warming up
+LIMIT = 0.9  # largest relative change: warming up neither stops a drive nor doubles its gain
 
 
 @law
 def output(rate: float, u: float, t: float) -> float:
-    """The voltage with the gain of time ``t``, V."""
+    """The voltage with the gain at time ``t``, V."""
     return u * (1.0 + min(max(rate * t, -LIMIT), LIMIT))
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """The voltage, growing with time."""
+    """Voltage times time."""
     yield Guess(columns(-scene.voltage * scene.time), lambda c: (float(c[0]),))
 
 

@@ -10,17 +10,17 @@ import numpy as np
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
 
-LEAST = 0.5  # rad of travel: within less, a sine is a load and a linear spring to 1.6 % of its amplitude
+LEAST = 0.5  # least travel, rad: below it, a sine equals a load and a linear spring within 1.6 % of its amplitude
 
 
 @law
 def force(amplitude: float, phase: float, x: float, gain: float) -> float:
-    """Force towards where the arm hangs at the angle ``x``, V; the drive may be wired the other way round."""
+    """Force towards the hanging position at the angle ``x``, V; it takes the sign of the gain."""
     return math.copysign(amplitude, gain) * math.sin(x + phase)
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """Sine and cosine of the position, an angle; none where the travel is too short to tell them from a load and a spring."""
+    """Sine and cosine of the position, an angle; none if the travel is too short to distinguish them from a load and a spring."""
     low, high = np.quantile(scene.position, [0.01, 0.99])
     way = math.copysign(1.0, scene.gain)
     if high - low >= LEAST:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
 
-LEAST = 0.01  # of the spring at the middle that it must have won at the end of the travel, to be one that stiffens
+LEAST = 0.01  # least cubic force at the end of the travel, relative to the linear force there
 
 
 @law
@@ -23,7 +23,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 
 def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
-    """A spring that does not stiffen is a return spring."""
+    """Rejects a spring that does not stiffen within the travel."""
     cubic, linear = values
     wins = cubic * max(place**2 for place in between)
     return "within the travel it does not stiffen: a return spring" if wins < LEAST * linear else ""

@@ -14,12 +14,12 @@ from xy_sysid.samples.block import FloatArray
 
 @law
 def error(amplitude: float, period: float, phase: float, x: float) -> float:
-    """What the encoder shows too much at ``x``, m."""
+    """Encoder reading minus position at ``x``, m."""
     return amplitude * math.sin(2.0 * math.pi * x / period + phase)
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """Sine and cosine of the lengths at which the error in velocity, over velocity, repeats along the travel."""
+    """Sine and cosine at the periods of the relative velocity error along the travel."""
     v = scene.velocity
     e = scene.smooth(scene.error, 300.0)
     for period in scene.periods(e * v, v * v):
@@ -39,11 +39,11 @@ class _Reader:
 
 
 def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
-    """A reading that changes by less than a fifth more or less than the motion, and repeats; beyond, it explains any signal by itself."""
+    """Rejects a slope of 0.2 or more, and less than half a period within the travel: such an error could explain any signal."""
     slope, repeats = 2.0 * math.pi * values[0] / values[1], (between[1] - between[0]) / values[1]
     if slope >= 0.2:
-        return f"the reading would change by {100 * slope:.3g} % more or less than the motion: no encoder does"
-    return "" if repeats >= 0.5 else f"only {repeats:.2g} of its periods are within the travel, so it cannot be seen whether it repeats"
+        return f"the reading would change by {100 * slope:.3g} % more or less than the motion: no encoder does that"
+    return "" if repeats >= 0.5 else f"only {repeats:.2g} of its periods are within the travel, so the data do not show whether it repeats"
 
 
 EFFECT = Effect(

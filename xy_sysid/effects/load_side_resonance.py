@@ -10,12 +10,12 @@ from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene
 from xy_sysid.samples.block import FloatArray
 
-LOWEST, HIGHEST = 1.0, 600.0  # Hz, where it is looked for
+LOWEST, HIGHEST = 1.0, 600.0  # Hz, range of the tested frequencies
 
 
 @law
 def section(frequency: float, damping: float, fs: float) -> tuple[float, float, float, float, float]:
-    """Two poles by the bilinear transform, exact at the resonance (Franklin, Powell & Workman, 3rd ed., sec. 6.1): nothing is folded back."""
+    """Two poles by the bilinear transform, exact at the resonance (Franklin, Powell & Workman, 3rd ed., sec. 6.1): no aliasing."""
     w = 2.0 * math.pi * frequency
     turn = min(0.5 * w / fs, 1.4)
     c = 2.0 * fs * turn / math.tan(turn)
@@ -25,7 +25,7 @@ def section(frequency: float, damping: float, fs: float) -> tuple[float, float, 
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """The traces of poles, as of a pole-zero pair: only what their two coefficients say is another thing."""
+    """The traces of a pole-zero pair; the two coefficients are read differently."""
     for trace, frequency in _pole_zero_pair.traces(scene, LOWEST, HIGHEST):
         yield Guess(trace, _Reader(frequency))
 

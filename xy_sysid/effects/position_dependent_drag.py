@@ -10,7 +10,7 @@ from xy_sysid.effects._scene import Guess, Scene, columns
 
 @law
 def force(slope: float, v: float, x: float, gain: float) -> float:
-    """Drag beyond the base's own v / gain at ``x``, V; negative where it is less."""
+    """Drag at ``x`` in addition to the base's own v / gain, V."""
     return slope * x * v / gain
 
 

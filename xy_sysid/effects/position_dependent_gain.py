@@ -14,13 +14,13 @@ from xy_sysid.samples.block import FloatArray
 
 @law
 def force(depth: float, period: float, phase: float, u: float, v: float, x: float, gain: float) -> float:
-    """Voltage lost and back-EMF gained at ``x``, V."""
+    """Loss of drive voltage plus increase of back-EMF at ``x``, V."""
     factor = 1.0 + depth * math.sin(2.0 * math.pi * x / period + phase)
     return (1.0 - factor) * u + (factor * factor - 1.0) * v / gain
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """Sine and cosine times what the motor's constant multiplies, at the lengths at which the missing force repeats."""
+    """Sine and cosine, times the signal that a change of the motor constant multiplies, at the periods of the missing force over it."""
     base = 2.0 * scene.velocity / scene.gain - scene.voltage
     for period in scene.periods(scene.missing_force() * base, base * base):
         angle = 2.0 * math.pi * scene.position / period

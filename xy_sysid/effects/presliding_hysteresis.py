@@ -12,13 +12,13 @@ from xy_sysid.effects._scene import Guess, Scene, columns
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import FloatArray
 
-LENGTHS = (0.015, 0.05, 0.15, 0.5)  # of the way between two reversals
-DAMPING = 0.075  # of the usual input over the usual speed
+LENGTHS = (0.015, 0.05, 0.15, 0.5)  # relative to the distance between two reversals
+DAMPING = 0.075  # start value, relative to the standard deviation of the voltage over that of the velocity
 
 
 @law
 def bend(coulomb: float, length: float, bristle: float, v: float, h: float, level: float) -> float:
-    """Deflection after ``h`` s at the constant speed ``v``, m: the exact solution, so no step is too long."""
+    """Deflection after ``h`` s at the constant speed ``v``, m: the exact solution, for steps of any length."""
     if v == 0.0:
         return bristle
     slide = length * (coulomb + level) / coulomb
@@ -34,7 +34,7 @@ def force(coulomb: float, length: float, damping: float, bristle: float, v: floa
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """Bristles that follow the measured motion, for lengths up to half of the way between two reversals."""
+    """Deflection of bristles in the measured motion, for lengths up to half the distance between two reversals."""
     v, swing, usual = scene.smooth(scene.velocity, 300.0), scene.swing, float(np.std(scene.velocity))
     if not swing > 0.0:
         return
@@ -55,7 +55,7 @@ class _Reader:
 
 @compiled
 def _deflection(v: FloatArray, period: float, length: float) -> FloatArray:
-    """(n,) of bristles over their length, -1..1, at the middle of samples with the mean speeds ``v``."""
+    """(n,) deflection over length, -1..1, at the middle of samples with the mean speeds ``v``."""
     bristle, found = 0.0, np.empty(v.size)
     for i in range(v.size):
         middle = bend(1.0, length, bristle, v[i], 0.5 * period, 0.0)

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
 
-LEAST = 1e-3  # V/(m/s)2: where a fit begins if the trace has the wrong sign
+LEAST = 1e-3  # V/(m/s)2: lower bound, and start value if the trace has the wrong sign
 
 
 @law
 def force(coefficient: float, v: float, gain: float) -> float:
-    """Force against the drive, V; the drive may be wired the other way round."""
+    """Force against the drive, V; it takes the sign of the gain."""
     return math.copysign(coefficient, gain) * abs(v) * v
 
 

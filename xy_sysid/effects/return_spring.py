@@ -10,18 +10,18 @@ import numpy as np
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns
 
-LEAST = 0.05  # V/m on the usual machine: the softest that a fit begins with
+LEAST = 0.05  # V/m on the reference machine: least start value of the stiffness
 
 
 @law
 def force(stiffness: float, rest: float, softening: float, x: float, gain: float) -> float:
-    """Force towards the rest at ``x``, V; the drive may be wired the other way round."""
+    """Force towards the rest position at ``x``, V; it takes the sign of the gain."""
     stretched = x - rest
     return math.copysign(stiffness, gain) * stretched * (1.0 - softening * stretched * stretched)
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """A linear spring with its preload; and position and cube, seen from the middle of the travel."""
+    """A linear spring with its preload; and position and its cube relative to the middle of the travel."""
     x, way = scene.position, math.copysign(1.0, scene.gain)
     least = LEAST * scene.similar.factor("V/m")
     yield Guess(columns(way * x, np.full_like(x, way)), lambda c: (max(float(c[0]), least), -float(c[1]) / max(float(c[0]), least), 0.0))
@@ -32,10 +32,10 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 
 def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
-    """A spring pulls harder the farther it is stretched: what gives way on the travel is none, but a part of a wave."""
+    """Rejects a force that falls with distance within the travel: that is part of a wave, not a spring."""
     _, rest, softening = values
     gives_way = 3.0 * softening * max((place - rest) ** 2 for place in between) >= 1.0
-    return "it would give way within the travel, as no spring does" if gives_way else ""
+    return "its force would fall with distance within the travel, unlike that of a spring" if gives_way else ""
 
 
 EFFECT = Effect(

@@ -18,7 +18,7 @@ def output(limit: float, u: float) -> float:
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """What lies above a limit, for limits from the top 0.1 to the top 90 per cent of the voltages."""
+    """The voltage beyond a limit, for limits that the highest 0.1 to 90 % of the magnitudes exceed."""
     u = scene.voltage
     for limit in np.quantile(np.abs(u), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.92, 0.96, 0.98, 0.99, 0.997, 0.999]):
         above = u - np.clip(u, -limit, limit)
@@ -26,7 +26,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 
 class _Reader:
-    """The limit that was tried."""
+    """The tested limit."""
 
     def __init__(self, limit: float) -> None:
         self.limit = limit

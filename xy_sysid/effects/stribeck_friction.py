@@ -20,9 +20,9 @@ def level(excess: float, coulomb: float, velocity: float, v: float) -> float:
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """The direction of motion, evenly and near rest, for Stribeck speeds from 2 to 500 per cent of the usual one.
+    """The direction of motion, at all speeds and near rest, for Stribeck speeds of 2 to 500 % of the velocity's standard deviation.
 
-    Above the usual one it bends as any drag does, and promises what it cannot keep beside a base that is not right yet.
+    Above 100 % the trace resembles drag, and with an inaccurate fixed base it would explain too much.
     """
     direction, v = scene.direction(), scene.smooth(scene.velocity, 300.0)
     usual = float(np.std(v))

@@ -22,7 +22,7 @@ GROUP = "xy_sysid.effects"
 
 
 def library(files: Iterable[Path | str] | Path | str = ()) -> Library:
-    """The standard effects, those of installed packages, and those of the files; raises BadInput for what is not an effect.
+    """The standard effects, those of installed packages, and those of the files; raises BadInput for an object that is not an effect.
 
     The files are run: give only those that you trust.
     """
@@ -40,7 +40,7 @@ def from_file(path: Path) -> list[Effect]:
     with blamed(path):
         text = importlib.util.decode_source(path.read_bytes())
         total = hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
-        name = f"xy_sysid_user_{total[:16]}"  # named by its text alone: cached compiled code imports this module, wherever the file was
+        name = f"xy_sysid_user_{total[:16]}"  # named by its text alone: cached compiled code imports this module, even if the file was moved
         loader = TextLoader(text, str(path), {"__file__": str(path)})  # run exactly this text, even if the file changes
         spec = importlib.util.spec_from_loader(name, loader)
         assert spec is not None

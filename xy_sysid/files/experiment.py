@@ -45,7 +45,7 @@ def write_experiment(path: Path, found: NextExperiment) -> None:
 def read_experiment(settings: ExcitationSettings, path: Path) -> Taken:
     """Settings with the experiment of a file, and its allowed start positions.
 
-    Raises BadInput for a file that cannot be read, or that asks for more than the settings allow.
+    Raises BadInput for a file that cannot be read, or that needs more than the settings allow.
     """
     try:
         text = text_of(path, "an experiment")

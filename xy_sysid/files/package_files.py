@@ -12,7 +12,7 @@ PACKAGE = "xy_sysid"
 def share(start: Path | None = None) -> Path:
     """The folder that holds ``config`` and ``launch``.
 
-    A source tree (an editable install, a colcon build with symlinks) has them beside the package; an installation
+    A source tree (an editable install, a colcon build with symlinks) has them next to the package; an installation
     (pip, colcon) has them in ``share/xy_sysid`` of the prefix that holds the package.
 
     Raises BadInput if neither exists.

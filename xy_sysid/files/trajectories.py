@@ -1,4 +1,4 @@
-"""A trajectory as trajectory_msgs/JointTrajectory in YAML, as ``ros2 topic pub`` takes it, and as a CSV of its reference."""
+"""A trajectory as trajectory_msgs/JointTrajectory in YAML for ``ros2 topic pub``, and as a CSV of its reference."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from xy_sysid.excitation.trajectory import Trajectory
 
 
 def as_yaml(made: Trajectory, joint: str) -> str:
-    """The message; a stamp of 0 begins when it arrives."""
+    """The message as YAML; with a stamp of 0 the motion starts when it arrives."""
     points = [
         {
             "positions": [float(place)],

@@ -1,7 +1,7 @@
 """The wander of a parameter on similar machines, learned from the series of all other axes of a table.
 
-Machines of a fleet wander similarly, but not identically. Therefore the model has two levels. Each candidate says that the spreads of the axes are
-log-normal about one value with one width, and that one kind of slowness is usual. The candidates are weighted by how well they explain the series
+Machines of a fleet wander similarly, but not identically. Therefore the model has two levels. In each candidate the spreads of the axes are
+log-normal about one value with one width, and one kind of slowness is usual. The candidates are weighted by how well they explain the series
 of all axes. The wander of a new axis is predicted from the weighted candidates. This also learns how similar the machines are: it distinguishes
 twenty axes that all spread by 2 % from twenty axes that spread by 0.5 to 8 %.
 

@@ -5,8 +5,8 @@ within them. Therefore the estimates of the running machine are not independent 
 test of ``change``: its statistic for two recordings whose wander is known. The wander is the spread between recordings, of the fleet's table or
 the usual one. The threshold is that of a trend with one recording a day.
 
-As in a trend, one or two outlying estimates are no change. A parameter has left its interval when AGREEING consecutive estimates, from stretches
-without a common sample, say so.
+As in a trend, one or two outlying estimates are no change. A parameter has left its interval when AGREEING consecutive estimates show it, from
+stretches without a common sample.
 """
 
 from __future__ import annotations

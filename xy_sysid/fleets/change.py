@@ -50,9 +50,9 @@ class Change:
     """A change of a series.
 
     after:    number of the last recording before it; first, last: 95 % interval of that number
-    duration, size, sigma: recordings' distances that it took, part of the level, and its standard deviation; of a change that goes on until the last
-        of the recordings that it explains alone
-    declared: number of the recording with which it was certain enough; statistic: log of Shiryaev and Roberts' then and with all recordings
+    duration, size, sigma: usual distances between recordings that it took, fraction of the level, and its standard deviation; for a change that
+        still continues, up to the last recording that it explains alone
+    declared: number of the recording with which it was certain enough; statistic: log Shiryaev-Roberts statistic then and with all recordings
     """
 
     after: int
@@ -105,7 +105,7 @@ def weighed(parts: Whitened, shapes: FloatArray) -> tuple[FloatArray, FloatArray
     """For one wander: (2 n - 1, n) likelihood ratios of one or two outlying recordings, times their probability; and (n,) log of the sum of the
     ratios of all changes.
 
-    shapes: from ``hypotheses``; parts holds the whitened shapes
+    shapes: from ``hypotheses``; parts: the whitened shapes
     """
     n = shapes.shape[0]
     ratios = parts.ratios(np.argmax(shapes != 0.0, axis=0))

@@ -29,8 +29,8 @@ DIED = (
 )
 HERE = {
     "distributed.scheduler.allowed-failures": 0,  # a task whose process died is reported at once
-    "distributed.scheduler.worker-saturation": 1.0,  # one task a process
-    "distributed.worker.profile.enabled": False,  # it keeps the stacks of an hour, 100 MB and more
+    "distributed.scheduler.worker-saturation": 1.0,  # one task for each process
+    "distributed.worker.profile.enabled": False,  # it stores the stacks of an hour, 100 MB and more
     "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,  # as dask itself sets for BLAS
 }
 

@@ -23,7 +23,7 @@ Place = tuple[datetime, str]  # date and file name; recordings are sorted by the
 
 @dataclass
 class _Machine:
-    """The recordings of one machine, or of one axis of it where paths tell the axis.
+    """The recordings of one machine, or of one of its axes if paths name the axis.
 
     given: tasks in order; earlier: rows of the table that are not among these; found: effects to try first, None until known
     """

@@ -123,7 +123,7 @@ def _first_line(error: Exception) -> str:
 def merged(folder: Path, rows: Iterable[Row], library: Library = STANDARD) -> None:
     """Merge rows into the table.
 
-    A recording replaces rows of the same source, whatever their machine name was, and rows of the same content and name under another
+    A recording replaces rows of the same source, with any machine name, and rows of the same content and name under another
     source. Values that the new rows do not contain are kept, with their columns.
     """
     new: dict[str, list[Row]] = {}

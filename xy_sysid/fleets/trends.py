@@ -93,7 +93,7 @@ class Trend:
 
 @dataclass(frozen=True, slots=True)
 class Trends:
-    """All trends of a table. axes: with their dates; trends: of every parameter; events: changes, latest last; pooled: True if the spread was learned
+    """All trends of a table. axes: with their dates; trends: of each parameter; events: changes, latest last; pooled: True if the spread was learned
     from several axes; unread: recordings that could not be read"""
 
     axes: tuple[Axis, ...]

@@ -22,7 +22,7 @@ SLOW = ((0.0, 1.0), *((part, length) for part in (0.3, 0.7, 1.0) for length in (
 USUAL = 0.03  # spread between recordings of an unchanged axis: scatter of the friction torque of ball screws, the least stable parameter
 SIZES = (0.01, 0.04, 0.16, 0.64)  # standard deviation of a change, part of the level
 CERTAIN = 600.0  # log likelihood ratio above which differences do not matter
-EXACT = 1e-5  # fraction of the level: no estimate is taken to be more exact
+EXACT = 1e-5  # fraction of the level: smallest assumed error of an estimate
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Wander:
-    """spread: tau, part of the level; slow: part of tau^2 that is correlated from one recording to the next, over ``length`` usual distances."""
+    """spread: tau, fraction of the level; slow: fraction of tau^2 that is correlated between recordings, over ``length`` usual distances."""
 
     spread: float
     slow: float

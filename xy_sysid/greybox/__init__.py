@@ -10,6 +10,6 @@ parameters:      the parameters of a model as one row: simulation, bounds, and i
 free_run:        the fit by free simulation: base alone or with effects, scored on held-out data
 one_step:        the fit of effects that only one-step prediction can judge
 innovation_test: the score test on the innovations of one-step prediction
-whitened:        the rival of one-step prediction: a simulation with an autoregressive model of its error
+whitened:        the baseline for one-step prediction: a simulation with an autoregressive model of its error
 open_loop:       free simulation of the position from the first sample to the last
 """

@@ -25,33 +25,33 @@ from xy_sysid.samples.recording import SLOWEST
 from xy_sysid.units import USUAL, Units
 
 FIRST = 28_000  # samples of the first stage of a fit, of all recordings together
-TRAINING = 2.0 / 3.0  # of the record, for what must run through from the start (one-step prediction)
-EPSILON = 1e-3  # part of the motion to which laws and their integration are trusted
+TRAINING = 2.0 / 3.0  # fraction of the record for one-step prediction, which must run without interruption from the start
+EPSILON = 1e-3  # assumed relative accuracy of laws and their integration
 FEWEST_SCREENING_WINDOWS = 2  # least number of windows of a screening fit
 EXCITED_PART = 0.1  # least power of the first stage in each excited band, compared with that of all data
-FEWEST = 256  # samples of all recordings
-SHORTEST = 16  # samples of each
-WINDOWS, ROOM = 14.0, 4.0  # window lengths that all recordings together, and the longest, must hold at least; else they are made shorter
-FITTED_BLOCK, HELD_OUT_BLOCK = 3.0, 1.5  # window lengths of a block that is fitted, and of one that is held out
+FEWEST = 256  # least samples of all recordings together
+SHORTEST = 16  # least samples of each recording
+WINDOWS, ROOM = 14.0, 4.0  # least window lengths of all recordings together, and of the longest; otherwise windows are shortened
+FITTED_BLOCK, HELD_OUT_BLOCK = 3.0, 1.5  # window lengths of a fitted block, and of a held-out block
 PATH_STEP = 0.05  # s between the positions that are summed to a path, so that noise does not lengthen it
 PASSED_AGAIN = 1.2  # times the travel: a shorter path passes each position only once
-SHIFTS = 4  # places tried for the blocks that are held out
+SHIFTS = 4  # tested positions of the held-out blocks
 
 
 class Work:
-    """The amount of simulation so far: samples times sub-steps. It is the same on every computer, busy or not."""
+    """The amount of simulation so far: samples times sub-steps. It does not depend on the computer or its load."""
 
     def __init__(self) -> None:
         self._sum = 0.0
         self._new: deque[float] = deque()
 
     def add(self, samples: float) -> None:
-        """From any thread."""
+        """Add to the sum; any thread may call this."""
         self._new.append(samples)
 
     @property
     def done(self) -> float:
-        """The sum, for the one thread that searches."""
+        """The sum; only the searching thread may call this."""
         while self._new:
             self._sum += self._new.popleft()
         return self._sum
@@ -67,7 +67,7 @@ class AxisData:
     early: samples of each recording's velocity in the first stage, which ``first_stage`` returns
     screening_windows: windows of a screening fit; they begin at a sample of ``first_stage(velocity)``
     training: samples of ``velocity`` for filters that must run without interruption
-    units: the units that V and m stand for, used in sentences
+    units: the actual units of what is called V and m here, used in sentences
     work: amount of simulation
     """
 
@@ -98,7 +98,7 @@ class AxisData:
 
     @property
     def encoder(self) -> float:
-        """rms of the sensor's noise as that of a position, from one sample to the next, m."""
+        """rms of the sensor's noise, as noise of the position from one sample to the next, m."""
         return self.floor.encoder / self.sampling_rate ** {"position": 0, "velocity": 1, "acceleration": 2}[self.units.sensed]
 
     @property
@@ -108,16 +108,16 @@ class AxisData:
 
     @property
     def steps(self) -> tuple[slice, ...]:
-        """The same of ``velocity``."""
+        """The samples of ``velocity`` of each recording."""
         return tuple(slice(run.start - k, run.stop - k - 1) for k, run in enumerate(self.runs))
 
     @property
     def first(self) -> int:
-        """Samples of the first stage."""
+        """Number of samples of the first stage."""
         return sum(self.early)
 
     def counts(self, early: bool) -> tuple[int, ...]:
-        """Samples of each recording's velocity in the first stage, or in the whole."""
+        """Number of samples of each recording's velocity in the first stage, or in total."""
         return self.early if early else tuple(step.stop - step.start for step in self.steps)
 
     def first_stage(self, signal: FloatArray) -> FloatArray:
@@ -142,13 +142,13 @@ class AxisData:
 
     @cached_property
     def passed_once(self) -> bool:
-        """Each position is passed only once, so an effect of position cannot be distinguished from a drift."""
+        """True if each position is passed only once, so a position-dependent effect cannot be distinguished from a drift."""
         apart = max(int(PATH_STEP * self.sampling_rate), 1)
         way = sum(float(np.sum(np.abs(np.diff(self.position[run][::apart])))) for run in self.runs)
         return way < PASSED_AGAIN * (self.reach[1] - self.reach[0])
 
     def begins(self, signal: FloatArray) -> FloatArray:
-        """(n - r,) of a signal (n,), such as the voltage: at the beginning of each sample."""
+        """(n - r,) value of a signal (n,), such as the voltage, at the start of each sample of ``velocity``."""
         return np.concatenate([signal[run][:-1] for run in self.runs])
 
     def middle(self) -> FloatArray:
@@ -156,11 +156,11 @@ class AxisData:
         return np.concatenate([0.5 * (self.position[run][1:] + self.position[run][:-1]) for run in self.runs])
 
     def held_samples(self) -> NDArray[np.bool_]:
-        """(n - r,) those of ``velocity`` in a window that is held out."""
+        """(n - r,) True for samples of ``velocity`` in a held-out window."""
         return self.held_out.covered(self.velocity.size)
 
     def first_windows(self) -> Windows:
-        """Every window of the first stage, fitted and held out; those held out alone where the first stage is all that there is."""
+        """Every window of the first stage, fitted and held out; only held-out windows if the first stage contains all data."""
         if self.first >= self.velocity.size:
             return self.held_out
         both = np.sort(np.concatenate((self.screening_windows.begins, _within(self.held_out, self.steps, self.early).begins)))
@@ -168,7 +168,7 @@ class AxisData:
 
 
 def prepare(sampling_rate: float, voltage: FloatArray, position: FloatArray, epsilon: float = EPSILON, units: Units = USUAL) -> AxisData:
-    """One recording of an axis for fitting. Raises BadInput for less than 256 samples or arrays that do not fit together."""
+    """One recording of an axis for fitting. Raises BadInput for less than 256 samples or arrays of different lengths."""
     return prepare_all(sampling_rate, [(voltage, position)], epsilon, units)
 
 
@@ -233,8 +233,8 @@ def one_stretch(data: AxisData, place: int) -> AxisData:
 
 
 def _early(whole: Windows, fitted: Windows, velocity: FloatArray, least: Floor, steps: Sequence[slice]) -> tuple[int, ...]:
-    """Samples of each recording in the first stage: as many as it takes that what the whole excites is excited there (a sweep takes its time),
-    and that a fit sees two windows."""
+    """Samples of each recording in the first stage: enough to excite each band that all data excite (a sweep takes time), and to contain
+    two fitted windows."""
     sizes = np.array([step.stop - step.start for step in steps])
     each = FIRST if len(steps) == 1 else max(FIRST // len(steps), int(FITTED_BLOCK * whole.layout.length))
     powers = whole.layout.powers(whole.spectrum(velocity))[:, least.excited]
@@ -249,7 +249,7 @@ def _early(whole: Windows, fitted: Windows, velocity: FloatArray, least: Floor, 
 
 
 def _within(windows: Windows, steps: Sequence[slice], early: Sequence[int] | NDArray[np.int64]) -> Windows:
-    """The windows that end within the beginnings of the recordings, by their place in these alone."""
+    """The windows within the first samples of the recordings (``early``), as positions in these samples alone."""
     offsets = np.cumsum([0, *early[:-1]])
     found = []
     for step, count, offset in zip(steps, early, offsets, strict=True):
@@ -259,12 +259,12 @@ def _within(windows: Windows, steps: Sequence[slice], early: Sequence[int] | NDA
 
 
 def _begins(length: int, start: int, stop: int) -> NDArray[np.int64]:
-    """First samples of half overlapping windows of one recording."""
+    """First samples of half-overlapping windows of one recording."""
     return np.arange(start, max(stop - length, start) + 1, max(length // 2, 1), dtype=np.int64)
 
 
 def _split(layout: Bands, spans: Sequence[tuple[int, int]], velocity: FloatArray) -> tuple[Windows, Windows]:
-    """Windows to be fitted and to be held out: the blocks lie where both move alike."""
+    """Fitted and held-out windows, with the shift of blocks at which the power of the motion in both is most similar."""
     choices = []
     for shift in range(SHIFTS):
         cut = [_blocks(layout.length, start, stop, shift) for start, stop in spans]
@@ -280,7 +280,7 @@ def _split(layout: Bands, spans: Sequence[tuple[int, int]], velocity: FloatArray
 
 
 def _blocks(length: int, start: int, stop: int, shift: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First samples of the windows within blocks that are fitted, and within those that are held out."""
+    """First samples of the windows within fitted blocks, and within held-out blocks."""
     fit_length, held_length = int(FITTED_BLOCK * length), int(HELD_OUT_BLOCK * length)
     fitted: list[NDArray[np.int64]] = []
     out: list[NDArray[np.int64]] = []

@@ -1,6 +1,6 @@
 """The error in velocity, band by band, compared with the noise floor.
 
-The error passes overlapping Hann windows; one line of one window is one number. With half overlap the windows add up to a
+The error is cut into overlapping Hann windows; one line of one window is one number. With half overlap the windows add up to a
 constant, so scaled by ``1 / sqrt(sum of window^2 per sample)`` the squares add up to those of the samples (Parseval), and
 divided by the power density of the error they are the terms of a likelihood (Whittle 1953).
 """
@@ -20,12 +20,12 @@ from xy_sysid.samples.recording import as_sensed
 from xy_sysid.units import Sensed
 
 TOP = 700.0  # Hz; above, at 2 kHz, differences of an encoder's position are all noise
-TOP_SHARE = 0.35  # of the sampling rate, for slow sampling
-WINDOW = 2.0  # s, nearly: the lowest band is 1/2 Hz wide
-NOISE_BAND = (0.6, 0.94)  # of Nyquist: the quietest twentieth there is the encoder's; friction's harmonics may reach in
-BINS, HARMONICS, SPARSE = 128, 16, 4  # of the spectrum of what counting adds, from every fourth sample
-POLES = 60  # of rigid axes that are tried
-SEEN = 3.0  # a band is excited if the measured velocity has this many times the encoder's noise
+TOP_SHARE = 0.35  # limit of ``TOP`` for slow sampling, relative to the sampling rate
+WINDOW = 2.0  # s, approximately: the lowest band is 1/2 Hz wide
+NOISE_BAND = (0.6, 0.94)  # relative to Nyquist; its quietest twentieth counts as encoder noise, as harmonics of friction may reach into it
+BINS, HARMONICS, SPARSE = 128, 16, 4  # of the spectrum of quantisation noise, from every fourth sample
+POLES = 60  # number of tested rigid axes
+SEEN = 3.0  # a band is excited if the power of the measured velocity is this many times that of the encoder noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Bands:
     """Windows and bands of one sampling rate.
 
     length: samples of a window; band: (lines,) number of the band that each line of the spectrum up to the top is in
-    sensed: what was measured; where it is an acceleration, spectra are of that, and m/s is m/s^2 wherever a power or an rms is named
+    sensed: the measured quantity; if it is an acceleration, spectra, powers and rms values are those of accelerations, in m/s^2
     """
 
     sampling_rate: float
@@ -44,7 +44,7 @@ class Bands:
 
     @property
     def amplitude(self) -> FloatArray:
-        """(lines,) that the spectrum of a velocity is multiplied by: 1, or what makes an acceleration of it."""
+        """(lines,) factor on the spectrum of a velocity: 1, or that of its difference if an acceleration is measured."""
         if self.sensed != "acceleration":
             return np.ones(self.band.size)
         return np.asarray(2.0 * np.sin(np.pi * self.frequency / self.sampling_rate) * self.sampling_rate)
@@ -55,35 +55,35 @@ class Bands:
         return np.asarray(np.arange(self.band.size) * self.sampling_rate / self.length)
 
     def edges(self) -> FloatArray:
-        """(count + 1,) Hz: where each band begins, and where the last one ends."""
+        """(count + 1,) Hz: start of each band, and end of the last."""
         first = np.searchsorted(self.band, np.arange(self.count))
         return np.append(self.frequency[first], self.frequency[-1])
 
     def power(self, spectrum: ComplexArray) -> FloatArray:
-        """(count,) variance per sample that each band would have if its density held up to Nyquist, m^2/s^2."""
-        with np.errstate(over="ignore", invalid="ignore"):  # a trial model that runs away has no end of it
+        """(count,) power density of each band, as the variance per sample of white noise with this density, m^2/s^2."""
+        with np.errstate(over="ignore", invalid="ignore"):  # a trial model may diverge
             lines = np.mean(spectrum.real**2 + spectrum.imag**2, axis=0)
         return np.asarray(np.bincount(self.band, lines, self.count) / self.lines)
 
     def powers(self, spectrum: ComplexArray) -> FloatArray:
-        """(windows, count): the same of each window."""
+        """(windows, count): the same for each window."""
         with np.errstate(over="ignore", invalid="ignore"):
             lines = spectrum.real**2 + spectrum.imag**2
             return np.asarray(np.add.reduceat(lines, np.searchsorted(self.band, np.arange(self.count)), axis=1) / self.lines)
 
     @property
     def lines(self) -> FloatArray:
-        """(count,) lines of the spectrum in each band."""
+        """(count,) number of lines in each band."""
         return np.bincount(self.band, minlength=self.count).astype(np.float64)
 
     def rms(self, power: FloatArray) -> float:
-        """m/s below the top, of a power (count,)."""
+        """rms below the top frequency, m/s, of a power (count,)."""
         return float(np.sqrt(np.sum(self.lines * power) * 2.0 / self.length))
 
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Some of the windows of a recording. layout: how they are cut; begins: (windows,) first sample of each."""
+    """Some windows of a recording. layout: windows and bands; begins: (windows,) first sample of each."""
 
     layout: Bands
     begins: NDArray[np.int64]
@@ -100,7 +100,7 @@ class Windows:
         return found * self.layout.amplitude if self.layout.sensed == "acceleration" else found
 
     def covered(self, samples: int) -> NDArray[np.bool_]:
-        """(samples,) those in any of the windows."""
+        """(samples,) True for samples in any of the windows."""
         inside = np.zeros(samples, dtype=np.bool_)
         for begin in self.begins:
             inside[begin : begin + self.layout.length] = True
@@ -108,18 +108,18 @@ class Windows:
 
     @property
     def end(self) -> int:
-        """Sample after the last of them."""
+        """Index after the last sample of the last window."""
         return int(self.begins[-1]) + self.layout.length if self.begins.size else 0
 
 
 @cache
 def _taper(length: int) -> FloatArray:
-    """(length,) of von Hann, with which squares of a spectrum add up to those of the samples."""
+    """(length,) Hann window, scaled so that squares of a spectrum add up to those of the samples."""
     return np.asarray(np.sqrt(2.0 / 0.75 / length) * np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2)
 
 
 def bands(sampling_rate: float, samples: int, count: int = 36, sensed: Sensed = "position") -> Bands:
-    """Windows of about 2 s (less for short data) and ``count`` bands or fewer, evenly spaced in the logarithm."""
+    """Windows of about 2 s (less for short data) and at most ``count`` bands, logarithmically spaced."""
     wanted = min(WINDOW * sampling_rate, samples)
     length = 2 ** max(int(np.round(np.log2(max(wanted, 16.0)))), 4)
     top = min(TOP, TOP_SHARE * sampling_rate)
@@ -131,13 +131,13 @@ def bands(sampling_rate: float, samples: int, count: int = 36, sensed: Sensed = 
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """The noise floor: no model has a smaller error.
+    """The noise floor: the error of an exact model.
 
-    noise:   (bands,) of the encoder alone, m^2/s^2, as of ``Bands.power``; power: with what laws and their integration are not trusted to
-    motion:  (bands,) of what is measured; excited: (bands,) bool
-    encoder: rms of the sensor's white noise, in the unit of what it measures
-    epsilon: part of the motion to which laws are trusted; lines: (bands,) in each
-    response: (bands,) |G|^2, (m/s/V)^2, of the machine to a force at the motor, which acts as its input does
+    noise:   (bands,) power of encoder noise, m^2/s^2, see ``Bands.power``; power: with the tolerated part of the motion
+    motion:  (bands,) power of the measured velocity; excited: (bands,) bool
+    encoder: rms of the sensor's white noise, in the unit of the measured quantity
+    epsilon: assumed relative accuracy of laws and their integration; lines: (bands,) number of lines
+    response: (bands,) |G|^2, (m/s/V)^2, of the machine to a force at the motor, which acts like its input
     """
 
     noise: FloatArray
@@ -151,10 +151,10 @@ class Floor:
 
 
 def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "position", driven_by: FloatArray | None = None) -> float:
-    """rms of the sensor's white noise: from the quietest band below Nyquist, not below what counting alone makes.
+    """rms of the sensor's white noise, from the quietest band below Nyquist; at least that of quantisation.
 
-    sensed: what it measures, of which position (n,) is the integral; the noise is in the unit of that
-    driven_by: input (n,); what it explains is no noise of a velocity or an acceleration, which go on up to Nyquist
+    sensed: the measured quantity, in whose unit the result is; position (n,), m, is the measurement or its integral
+    driven_by: input (n,); the part of a velocity or acceleration that it explains is not noise, because such motion extends up to Nyquist
     """
     measured = as_sensed(position, sampling_rate, sensed)
     stationary = np.diff(position) * sampling_rate if sensed == "position" else measured
@@ -170,7 +170,7 @@ def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "
         shared = np.abs(np.mean(spectrum * drive.conj(), axis=0)) ** 2 / np.maximum(np.mean(np.abs(drive) ** 2, axis=0), 1e-300)
         power = np.maximum(power - shared, 0.0) * windows.shape[0] / (windows.shape[0] - 1.0)
     power = power / np.sum(np.hanning(length) ** 2)
-    share = np.arange(1, power.size) / (length / 2.0)  # without the mean, which no noise in position makes
+    share = np.arange(1, power.size) / (length / 2.0)  # without the mean, to which position noise adds nothing
     white = power[1:]
     if sensed == "position":
         white = white / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
@@ -179,7 +179,7 @@ def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "
 
 
 def count_size(position: FloatArray) -> float:
-    """Step of the encoder, m: the smallest difference that most others are multiples of; 0 if there is none."""
+    """Resolution of the encoder, m: the smallest difference, if nearly all others are multiples of it; otherwise 0."""
     steps = np.abs(np.diff(position))
     steps = np.unique(steps[steps > 0.0])
     if steps.size == 0:
@@ -194,7 +194,7 @@ def count_size(position: FloatArray) -> float:
 
 
 def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float, driven: FloatArray | None = None) -> Floor:
-    """The floor of data with this measured velocity (n,), m/s. driven: (n,) V, its input, without which no response is known (0)."""
+    """The floor of data with this measured velocity (n,), m/s. driven: (n,) V, its input; without it the response is 0."""
     layout = windows.layout
     unit = np.ones(layout.band.size)  # of the sensor's white noise, by line
     if layout.sensed == "position":
@@ -223,10 +223,10 @@ def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float
 
 
 def _response(windows: Windows, velocity: FloatArray, driven: FloatArray) -> FloatArray:
-    """(bands,) |G|^2: measured where input and output are coherent, elsewhere that of the rigid axis which predicts the motion best.
+    """(bands,) |G|^2: measured where input and output are coherent, elsewhere that of the rigid axis that predicts the motion best.
 
     In a closed loop that follows a smooth path, friction makes the input broadband while the motion stays smooth: the estimate H1 (Bendat &
-    Piersol, Random Data, 4th ed., sec. 6.1) is then far too small. Between the two the mean of the logarithms counts, by the coherence.
+    Piersol, Random Data, 4th ed., sec. 6.1) is then far too small. The result is the geometric mean of both, weighted by the coherence.
     """
     layout = windows.layout
     force, moved = windows.spectrum(driven), windows.spectrum(velocity)
@@ -236,7 +236,7 @@ def _response(windows: Windows, velocity: FloatArray, driven: FloatArray) -> Flo
         return np.asarray(np.maximum(np.bincount(layout.band, lines, layout.count), 1e-300))
 
     def rigid(pole: float) -> tuple[float, FloatArray]:
-        """The motion's power that a drive with this pole predicts, and (lines,) power of its response; any phase, as no delay is known here."""
+        """Power of the motion that an axis with this pole predicts, and (lines,) power of its response; phase is ignored (unknown delay)."""
         answer = 1.0 / (1.0 + 2j * np.pi * layout.frequency / pole)
         seen, size = abs(np.sum(answer.conj() * cross)), max(float(np.sum(np.abs(answer) ** 2 * own)), 1e-300)
         return seen**2 / size, (seen / size * np.abs(answer)) ** 2
@@ -249,21 +249,21 @@ def _response(windows: Windows, velocity: FloatArray, driven: FloatArray) -> Flo
 
 
 def counted(layout: Bands, velocity: FloatArray, count: float, top: float) -> FloatArray:
-    """(lines,) power density of what counting adds to a position that moves with this velocity (n,), m/s, over that of white noise.
+    """(lines,) power density of quantisation noise at this velocity (n,), m/s, relative to white noise.
 
-    What is not counted is a saw of the position: at each moment its harmonics k, with 1/k^2 of the power, have k times the rate at which
-    counts are passed, folded at Nyquist (Bennett, Spectra of quantized signals, Bell Syst. Tech. J. 27, 1948). Where many counts are passed
-    in a sample that is white; where few are, it is many times as high below that rate, and next to nothing above. top: Hz, of the motion.
+    Quantisation error is a sawtooth of the position: its harmonics k, with 1/k^2 of the power, have k times the rate at which
+    counts are passed, folded at Nyquist (Bennett, Spectra of quantized signals, Bell Syst. Tech. J. 27, 1948). With many counts
+    per sample it is white; with few, it is much larger below that rate and nearly 0 above. top: Hz, highest frequency of the motion.
     """
     if top < TOP_SHARE * layout.sampling_rate:
         velocity = scipy.signal.sosfiltfilt(scipy.signal.butter(4, top, fs=layout.sampling_rate, output="sos"), velocity)
-    rate = np.abs(velocity[::SPARSE]) / (count * layout.sampling_rate)  # counts a sample
+    rate = np.abs(velocity[::SPARSE]) / (count * layout.sampling_rate)  # counts per sample
     power = np.zeros(BINS)
     for k in range(1, HARMONICS + 1):
         folded = np.abs(k * rate - np.round(k * rate))
         power += np.bincount(np.minimum((2.0 * BINS * folded).astype(np.int64), BINS - 1), minlength=BINS) / k**2
     density = power * BINS * 6.0 / np.pi**2 / rate.size
-    density += 1.0 - float(density.mean())  # of the harmonics above
+    density += 1.0 - float(density.mean())  # higher harmonics
     turns = float(np.std(np.diff(velocity)) / (np.pi * max(float(np.std(velocity)), 1e-300)))  # how fast the rate itself changes, over Nyquist
     density = scipy.ndimage.gaussian_filter1d(density, turns * BINS, mode="reflect")
     place = np.minimum((2.0 * BINS * layout.frequency / layout.sampling_rate).astype(np.int64), BINS - 1)
@@ -271,10 +271,10 @@ def counted(layout: Bands, velocity: FloatArray, count: float, top: float) -> Fl
 
 
 def tolerance(layout: Bands, error: ComplexArray, least: Floor) -> FloatArray:
-    """(bands,) m^2/s^2 by which squared errors (a spectrum of them) are divided in a fit.
+    """(bands,) m^2/s^2, power by which squared errors (a spectrum of them) are divided if the residual error is systematic.
 
-    What a model leaves above the floor is systematic: taken as one common error of each band (as Kennedy & O'Hagan 2001 do
-    for model discrepancy), it does not average out over the band's lines. So at the floor every line counts, and far above
-    it every band does, wide or narrow.
+    Residual error above the floor is treated as one common error of each band (like Kennedy & O'Hagan 2001
+    for model discrepancy), which does not average out over the band's lines. So at the floor every line counts, and far above
+    it each band counts once, wide or narrow.
     """
     return np.asarray(least.power + layout.lines * np.maximum(layout.power(error) - least.power, 0.0))

@@ -1,4 +1,4 @@
-"""Forces of the effects of a model on the measured motion, and models in which the force of one effect is moved to others.
+"""Forces of the effects of a model on the measured motion, and models in which other effects replace the force of one.
 
 Nothing is simulated: position, time and speed are measured, and these laws depend on nothing else.
 """
@@ -17,9 +17,9 @@ from xy_sysid.effects._contract import Parameter, arguments
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.samples.block import FloatArray
 
-LOOKS = 50  # at the forces, at most: a spring's rest far outside the travel takes ten
-SMOOTH = 300.0  # Hz, below which a speed is seen
-SPEEDS = 100  # at which levels of dry friction are compared
+LOOKS = 50  # most evaluations of the forces: a spring's rest position far outside the travel takes ten
+SMOOTH = 300.0  # Hz, low-pass for speeds
+SPEEDS = 100  # number of speeds at which levels of dry friction are compared
 
 
 def position_forces(model: AxisModel) -> list[str]:
@@ -78,14 +78,14 @@ def force_moved_to_others(data: AxisData, model: AxisModel, name: str) -> AxisMo
 
 
 def with_shared_values(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
-    """The model with a relative in the place of an effect: parameters of the same name keep their value, others get typical values."""
+    """The model with an effect replaced by a related one: parameters of the same name keep their value, others get typical values."""
     own = dict(zip(model.library[name].names, dict(model.effects)[name], strict=True))
     pairs = ((own.get(item.name, item.typical), item) for item in relative.on(data.similar))
     return model.without(name).with_effect(relative.name, [min(max(value, item.low), item.high) for value, item in pairs])
 
 
 def with_equal_force(data: AxisData, model: AxisModel, name: str, relative: Effect) -> AxisModel:
-    """The model with a relative in the place of an effect, with a force as similar as possible.
+    """The model with an effect replaced by a related one, with a force as similar as possible.
 
     As ``with_shared_values`` if the laws are neither position forces nor dry friction.
     """
@@ -96,7 +96,7 @@ def with_equal_force(data: AxisData, model: AxisModel, name: str, relative: Effe
 
 
 def with_force_from_trace(data: AxisData, model: AxisModel, name: str, other: Effect, scene: Scene) -> AxisModel | None:
-    """The model with another law in the place of an effect, with a force as similar as possible; start values are those of the most similar trace.
+    """The model with an effect replaced by another law, with a force as similar as possible; start values are those of the most similar trace.
 
     None if the law leaves no trace on this motion, or if one of the two is not a position force.
 
@@ -145,7 +145,7 @@ def _matched_to_friction(data: AxisData, model: AxisModel, name: str, relative: 
 
 
 def is_position_force(effect: Effect) -> bool:
-    """Whether the force depends on position and time alone."""
+    """True for a force that depends on position and time alone."""
     return effect.category == "force" and undoable(effect)
 
 
@@ -159,7 +159,7 @@ def _levels(effect: Effect, values: FloatArray, speeds: FloatArray) -> FloatArra
 
 def _least(left: Callable[[FloatArray], FloatArray], start: FloatArray, items: Sequence[Parameter]) -> FloatArray:
     """The values within the bounds with the smallest error; the start values within the bounds, if the error is not finite."""
-    from scipy.optimize import least_squares  # here, as it takes a while to import, and few ask
+    from scipy.optimize import least_squares  # here, because the import is slow and rarely needed
 
     low, high = np.array([item.low for item in items]), np.array([item.high for item in items])
     inside = np.clip(start, low, high)

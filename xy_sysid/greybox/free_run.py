@@ -48,11 +48,11 @@ FIRST_LOOK = Schedule(1, 6, 1e-2, 1e-2)
 NEARER = Schedule(4, 6, 3e-3, 3e-3)
 FINER = Schedule(2, 8, 1e-4, 1e-3)
 LONG = Schedule(3, 6, 1e-5, 1e-4)
-COARSE, MEDIUM = 2000.0, 4000.0  # Hz: finest sub-steps of looks and first rounds (errors up to 3e-3 of the motion), and of screening fits (6e-4)
+COARSE, MEDIUM = 2000.0, 4000.0  # Hz: finest sub-steps of score tests and first rounds (errors up to 3e-3 of the motion); of screening fits (6e-4)
 LEAST_EXPLAINED = 0.01  # of the residual voltage: an effect that explains less is not simulated before a fit. In 14 s below 10 Hz chance
 # explains half of this
-LATE = 1.0 / (4.0 * CUTOFFS[-1])  # s, of a delay with which nothing is read if it is wrong: a quarter of the shortest period that is looked at
-FAITHFUL = 0.1  # of the error of a model: allowed change of its motion with finer sub-steps
+LATE = 1.0 / (4.0 * CUTOFFS[-1])  # s; a longer delay, if wrong, hides all traces: a quarter of the shortest period that inverse starts use
+FAITHFUL = 0.1  # allowed change of a model's motion with finer sub-steps, relative to its error
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,16 +61,16 @@ class GreyboxFit:
 
     parameters:     gain, delay, pole, then ``effect.parameter``, with 95 % intervals
     training_error: rms in the windows of the fit, below the top band, m/s
-    held_out_error: the same in held-out windows
-    noise_floor:    encoder noise together with the tolerated part of the motion, m/s; one step ahead the noise alone
+    held_out_error: the same in the held-out windows
+    noise_floor:    encoder noise together with the tolerated part of the motion, m/s; for one-step prediction, encoder noise alone
     excess:         score of the held-out error, nats a line above the floor (``objective``); scores: (windows,) nats of each window
     forced:         lines of a window in which the unmodelled force exceeds the floor
-    force:          of the unmodelled force, V a sample (rms, white), that explains the held-out error beyond the floor
+    force:          rms of the unmodelled force (white), V per sample, that explains the held-out error above the floor
     simulated:      (n - r,) velocity over all recordings, m/s; error: (n - r,) measured minus simulated
     held_out_powers: (windows, bands) power of the held-out error, m^2/s^2
     units:          of input and output; m/s above is ``units.speed``
     is_screening:   True for a screening fit: it uses the data of the first stage; errors and simulation cover these data only
-    one_step:       judged by the prediction of the next sample from all earlier ones, not by simulation; errors are those of the prediction
+    one_step:       True if judged by one-step prediction, not by simulation; errors are then those of the prediction
     """
 
     model: AxisModel
@@ -93,11 +93,11 @@ class GreyboxFit:
 
     @property
     def power(self) -> FloatArray:
-        """(bands,) of the held-out error, m^2/s^2."""
+        """(bands,) power of the held-out error, m^2/s^2."""
         return np.asarray(self.held_out_powers.mean(axis=0))
 
     def parameter(self, name: str) -> Estimate:
-        """The parameter of this name; raises BadInput."""
+        """The parameter of this name; raises BadInput for an unknown name."""
         for item in self.parameters:
             if item.name == name:
                 return item
@@ -105,7 +105,7 @@ class GreyboxFit:
 
 
 def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
-    """Gain, delay and pole: from the best of the frequency response and inverse dynamics, with and without the delay of the former."""
+    """Gain, delay and pole, from the best start of the frequency response and of inverse dynamics, the latter with and without its delay."""
     gain, delay, pole = base_start(data.sampling_rate, data.first_stage(data.voltage), data.first_stage(data.velocity))
     models = [AxisModel(gain, delay, pole, library=library)]
     for late in {delay, 0.0}:
@@ -196,13 +196,13 @@ def _from_inverse_dynamics(data: AxisData, model: AxisModel, effect: Effect, sce
 
 
 def has_inverse_starts(model: AxisModel) -> bool:
-    """Whether inverse dynamics can include every effect of a model: position forces, dry friction, and effects of category input."""
+    """True if inverse dynamics can include every effect of a model: position forces, dry friction, and effects of category input."""
     known = {*position_forces(model), *dry_frictions(model), *(name for name, _ in model.effects if model.library[name].category == "input")}
     return all(name in known for name, _ in model.effects)
 
 
 def _amplified(data: AxisData, model: AxisModel, names: list[str], counts: Sequence[int]) -> FloatArray:
-    """(samples,) V, the delayed voltage behind some effects of the amplifier; counts: samples of each recording."""
+    """(samples,) V, the delayed voltage after some effects of category input; counts: samples of each recording."""
     row = np.array([model.gain, model.delay, model.pole, *(value for name in names for value in dict(model.effects)[name])])
     parts = []
     for run, count in zip(data.runs, counts, strict=True):
@@ -212,7 +212,7 @@ def _amplified(data: AxisData, model: AxisModel, names: list[str], counts: Seque
 
 
 def _friction_split(model: AxisModel) -> AxisModel:
-    """The model with a friction that is a sum of effects replaced by these, so that each has its own size."""
+    """The model with a friction law that equals a sum of effects replaced by these effects, so that each has its own size."""
     whole = [own for own in dry_frictions(model) if model.library[own].sum_of is not None]
     return model.apart(whole[0]) if whole else model
 
@@ -286,7 +286,7 @@ def _scene(data: AxisData, model: AxisModel, error: FloatArray, part: Callable[[
 
 
 def fit(data: AxisData, start: AxisModel, screening: bool = False, give_up_above: float = np.inf, late: Callable[[], bool] = in_time) -> GreyboxFit:
-    """Fit all parameters of a model from its present values; screening, give_up_above: see ``fit_with``; late: time is up, return the best so far."""
+    """Fit all parameters from the values of ``start``; screening, give_up_above: see ``fit_with``; late: True to end with the best result so far."""
     task = problem(data, start, True)
     rate = sub_steps(data, task, COARSE)
     run, scale = task.at(rate), task.scale
@@ -305,7 +305,7 @@ def fit(data: AxisData, start: AxisModel, screening: bool = False, give_up_above
 
 
 def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], bool] = in_time) -> GreyboxFit:
-    """The second stage alone, on all windows that are not held out, from a model that is nearly there."""
+    """Only the second stage of a fit, on all windows that are not held out, from a model close to the result."""
     task = problem(data, start, False)
     run = task.at(sub_steps(data, task, FINE))
     found = solve(run, Target(data.velocity, data.fitted, data.floor), task.scale, task.row, replace(LONG, late=late))
@@ -313,7 +313,7 @@ def finish(data: AxisData, start: AxisModel, runs: int = 0, late: Callable[[], b
 
 
 def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time) -> GreyboxFit:
-    """One law for several that are the same; where it is not, as a load is larger than the friction, they stay."""
+    """The fit with several effects merged into one law that is their sum; the given fit if that is worse (a load larger than the friction)."""
     whole = found.model.joined()
     if whole is found.model:
         return found
@@ -322,9 +322,9 @@ def joined(data: AxisData, found: GreyboxFit, late: Callable[[], bool] = in_time
 
 
 def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
-    """Hz: the longest sub-steps, a sample or halves of it, with which a model moves as with half as long.
+    """Hz, rate of the longest sub-steps (a sample, its half, ...) whose motion hardly differs from that with half as long ones.
 
-    The difference may be a tenth of the error or of the noise floor, in amplitude, as a mean over the excited bands.
+    The difference may be a tenth of the error or of the noise floor, in amplitude, averaged over the excited bands.
     """
     rate = min(data.sampling_rate, finest)
     if rate == finest:
@@ -341,7 +341,7 @@ def sub_steps(data: AxisData, task: FitProblem, finest: float) -> float:
     while rate < finest:
         finer = min(2.0 * rate, finest)
         then = moved(finer)
-        with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away, for which no step is short enough
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging model, for which no step is short enough
             apart = float(np.mean(power(then - now) / (power(measured - then) + least)))
         if not apart > FAITHFUL**2:
             break
@@ -379,7 +379,7 @@ def _result(data: AxisData, start: AxisModel, scale: Scale, found: Solution, scr
 
 
 def _delayed(voltage: FloatArray, samples: float) -> FloatArray:
-    """Mean over each sample of the voltage that many samples ago, before the start 0."""
+    """Mean over each sample of the voltage delayed by ``samples``; 0 before the start."""
     whole = int(samples)
     part = samples - whole
     padded = np.concatenate((np.zeros(whole + 1), voltage))

@@ -21,7 +21,7 @@ from xy_sysid.greybox.score_test import Projected, Trace, best_trace
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
 
-SMALL = 0.02  # of the rms voltage or velocity: how much of a trace is put in to see what it does
+SMALL = 0.02  # size of the added trace, relative to the rms voltage or velocity
 
 
 def traces(data: AxisData, model: AxisModel, effect: Effect, found: FilterFit, effects: Iterable[Effect]) -> list[Trace]:
@@ -98,7 +98,7 @@ def _moved(numbers: FloatArray) -> list[FloatArray]:
 
 
 def _missing_velocity(data: AxisData, found: FilterFit, innovation: FloatArray) -> FloatArray:
-    """(n,) m/s: what the forces that the innovations tell of would do to the base. Right but for its size and a short delay."""
+    """(n,) m/s: response of the base to the forces that the innovations imply. Correct except for its size and a short delay."""
     gain, _, pole = found.base
     b, a = mean_velocity_filter(gain, pole, data.sampling_rate)
     force = innovation * found.noise * data.sampling_rate**2 / (gain * pole)

@@ -1,7 +1,7 @@
 """Levenberg-Marquardt on the whitened error in velocity: the fit that minimises the objective.
 
-Levenberg 1944, Marquardt 1963. The error is divided by the spectrum that the objective gives it (``objective.spectrum``), which is worked
-out again before each round: iteratively reweighted least squares. A round that does not lower the objective is undone, so a fit
+Levenberg 1944, Marquardt 1963. The error is divided by its spectrum according to the objective (``objective.spectrum``), which is computed
+again before each round: iteratively reweighted least squares. A round that does not lower the objective is undone, so a fit
 never ends worse than it starts.
 Derivatives are forward differences of the simulation. They are computed again only if a step did not lower the cost as predicted, and are
 otherwise updated with the result of the step (Broyden 1965).
@@ -22,16 +22,16 @@ from xy_sysid.greybox.objective import Objective
 from xy_sysid.jit import on_all_cores
 from xy_sysid.samples.block import FloatArray
 
-TRUSTED = 0.25  # a step whose fall differs by less than this part from the one expected needs no new derivatives; with 0.75 long valleys take longer
-STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding, far below what bends
+TRUSTED = 0.25  # relative difference from the expected decrease below which no new derivatives are computed; with 0.75 long valleys take longer
+STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding errors, small enough for linearity
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """How long a solution goes on.
+    """When a solution ends.
 
-    rounds, steps: at most so many sets of weights, and so many steps with each; enough: relative fall of the cost that ends a round;
-    settled: nats a line; a round that gains less is the last; late: if true, the best so far is taken after the present step
+    rounds, steps: most sets of weights, and most steps with each; enough: relative fall of the cost that ends a round;
+    settled: nats a line; a round that gains less is the last; late: once True, the solution ends after the present step
     """
 
     rounds: int
@@ -43,7 +43,7 @@ class Schedule:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """How each parameter is moved: low, high: bounds; positive: as a logarithm; unit: size of 1 in the solver else."""
+    """Scaling of each parameter: low, high: bounds; positive: True for a logarithm; unit: otherwise the size of 1 in the solver."""
 
     low: FloatArray
     high: FloatArray
@@ -63,7 +63,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class Target:
-    """What is to be explained: velocity (n,) m/s, in some windows of it."""
+    """Data of a fit: velocity (n,), m/s, and the windows of it that count."""
 
     velocity: FloatArray
     windows: Windows
@@ -76,11 +76,11 @@ class Target:
 
     @cached_property
     def objective(self) -> Objective:
-        """Scores an error by band."""
+        """The objective for this floor."""
         return Objective.of(self.least)
 
     def spectrum(self, error: NDArray[np.complex128]) -> tuple[FloatArray, float]:
-        """(bands,) expected power of an error (windows, lines), and the error's score, nats a line; infinite for a model that runs away."""
+        """(bands,) expected power of an error (windows, lines), and the error's score, nats a line; infinite for a diverging model."""
         power = self.windows.layout.power(error)
         expected = self.objective.spectrum(power)
         return expected, self.objective.score(power, expected)
@@ -91,10 +91,10 @@ Predictor = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Solution:
-    """values: (k,) parameters; cost: whitened; score: of the objective, nats a line; runs: simulations done.
+    """values: (k,) parameters; cost: whitened; score: objective, nats a line; runs: number of simulations.
 
-    run, target: what was solved; error: (windows, lines) spectrum of what is left, m/s; change: (k, windows, lines) its derivatives by the
-    solver's coordinates, as last known; weight: (lines,) of the last round; normal: (k, k) products of the whitened derivatives
+    run, target: the problem; error: (windows, lines) spectrum of the residual error, m/s; change: (k, windows, lines) its last derivatives by the
+    solver's coordinates; weight: (lines,) of the last round; normal: (k, k) products of the whitened derivatives
     """
 
     values: FloatArray
@@ -111,10 +111,10 @@ class Solution:
 
     @cached_property
     def covariance(self) -> FloatArray:
-        """(k, k) of the solver's coordinates."""
+        """(k, k) covariance of the solver's coordinates."""
         windows, least, layout = self.target.windows, self.target.least, self.target.windows.layout
         noise, whitened = _covariance(self.normal), self.change * self.weight
-        with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away all is one mistake
+        with np.errstate(over="ignore", invalid="ignore"):  # all error of a diverging model is one common error
             beyond = layout.lines * np.maximum(layout.power(self.error) - least.noise, 0.0)
             share = np.nan_to_num(beyond / tolerance(layout, self.error, least), nan=1.0, posinf=1.0)
         repeats = 1.0 + (windows.begins.size - 1) * share
@@ -132,8 +132,8 @@ def solve(
 ) -> Solution:
     """The parameters with the smallest error for a target.
 
-    run: parameters -> velocity (n,), called from several threads at once; schedule: the weights are worked out before each round;
-    known: an earlier solution that ended at the start, whose derivatives hold nearly, and whose error does if it was of the same run
+    run: parameters -> velocity (n,), called from several threads at once; schedule: when to end;
+    known: an earlier solution that ended at ``start``: its derivatives are used as an approximation, and its error if it had the same ``run``
     """
     windows, measured = target.windows, target.measured
     runs = 0
@@ -142,7 +142,7 @@ def solve(
         return np.asarray(measured - windows.spectrum(run(scale.outer(inner))))
 
     def slopes(inner: FloatArray, error: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """New ones."""
+        """Derivatives of the error by forward differences."""
         nonlocal runs
         runs += inner.size
 
@@ -171,11 +171,11 @@ def solve(
         damping, converged, fresh = 1e-3, False, False
         for _ in range(schedule.steps):
             if not fresh:
-                with np.errstate(over="ignore", invalid="ignore"):  # of a model that runs away
+                with np.errstate(over="ignore", invalid="ignore"):  # a trial model may diverge
                     columns = (change * weight).reshape(size, -1).view(np.float64)
                     normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
                 fresh = True
-            if schedule.late() or not (np.all(np.isfinite(normal)) and np.any(normal)):  # a model that runs away, or stands
+            if schedule.late() or not (np.all(np.isfinite(normal)) and np.any(normal)):  # a diverging model, or one that does not move
                 break
             diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
             move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
@@ -225,7 +225,7 @@ def solve(
 
 
 def _move(normal: FloatArray, slope: FloatArray, scale: Scale, values: FloatArray) -> FloatArray:
-    """(k,) step of the solver's coordinates; a parameter at a bound that would leave it stays there, and the others move without it."""
+    """(k,) step of the solver's coordinates; a parameter at a bound that would cross it is held, and the step is that of the others."""
     free = np.ones(values.size, dtype=np.bool_)
     move = np.zeros(values.size)
     for _ in range(values.size):
@@ -239,23 +239,23 @@ def _move(normal: FloatArray, slope: FloatArray, scale: Scale, values: FloatArra
 
 
 def _weight(target: Target, expected: FloatArray) -> FloatArray:
-    """(lines,) by which an error (windows, lines) is multiplied, from its expected power (bands,)."""
+    """(lines,) weight of an error (windows, lines), from its expected power (bands,)."""
     counts = target.objective.lines > 0.0
     return np.asarray((counts / np.sqrt(expected))[target.windows.layout.band])
 
 
 def _updated(change: NDArray[np.complex128], taken: FloatArray, size: FloatArray, moved: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Derivatives (k, windows, lines) that agree with the step just taken, else as they were (Broyden 1965, eq. 4.5).
+    """Derivatives (k, windows, lines), changed only to agree with the step just taken (Broyden 1965, eq. 4.5).
 
-    taken: (k,) step; size: (k,) its weights; moved: change of the error that it made
+    taken: (k,) step; size: (k,) its weights; moved: resulting change of the error
     """
     missing = moved - np.tensordot(taken, change, 1)
     return np.asarray(change + np.multiply.outer(size * taken / float(size @ taken**2), missing))
 
 
 def _covariance(normal: FloatArray) -> FloatArray:
-    """Inverse of the normal matrix; infinite for a parameter that the data do not see at all."""
-    if not np.all(np.isfinite(normal)):  # of a model that runs away
+    """Inverse of the normal matrix; infinite for a parameter without influence on the data."""
+    if not np.all(np.isfinite(normal)):  # a diverging model
         return np.full(normal.shape, np.inf)
     spread = np.sqrt(np.diag(normal))
     seen = spread > 0.0
@@ -266,10 +266,10 @@ def _covariance(normal: FloatArray) -> FloatArray:
 
 
 def _with_repeated_error(change: NDArray[np.complex128], times: FloatArray, noise: FloatArray) -> FloatArray:
-    """(k, k) covariance where what is left in a band beyond the encoder's noise is one mistake, as harmful as one of its size can be.
+    """(k, k) covariance if the residual error of a band above encoder noise is one common error, in the worst case for its size.
 
-    Noise averages out over lines and windows, such a mistake does not. change: (k, windows, lines), whitened; times: (lines,) square root
-    of how many of them say the same; noise: (k, k) covariance if each were independent. The sandwich of White 1982 (eq. 3.2), with bands as
+    Noise averages out over lines and windows, such an error does not. change: (k, windows, lines), whitened; times: (lines,) square root
+    of the number of windows with the same error; noise: (k, k) covariance if all were independent. Sandwich of White 1982 (eq. 3.2), with bands as
     clusters of one common error (Kennedy & O'Hagan 2001).
     """
     seen = np.isfinite(np.diag(noise))
@@ -282,9 +282,9 @@ def _with_repeated_error(change: NDArray[np.complex128], times: FloatArray, nois
 
 
 def model_error_covariance(change: NDArray[np.complex128], motion: NDArray[np.complex128], layout: Bands, noise: FloatArray) -> FloatArray:
-    """(k, k) what laws and integration that are not exact add to the covariance, however long the record.
+    """(k, k) contribution of inexact laws and integration to the covariance; it does not fall with the length of the record.
 
-    In each band the model's motion may be off by one common complex factor. change: (k, windows, lines), whitened; motion: (windows, lines),
+    In each band the model's motion may be wrong by one common complex factor. change: (k, windows, lines), whitened; motion: (windows, lines),
     whitened, times that factor's size.
     """
     lines = np.einsum("kwl,wl->kl", change.conj(), motion)

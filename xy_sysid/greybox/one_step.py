@@ -23,11 +23,11 @@ from xy_sysid.greybox.parameters import Estimate, unit_of
 from xy_sysid.greybox.score_test import bounded
 from xy_sysid.response.frf import Z95
 
-AT_NOISE = 3.5  # held-out innovation over the encoder's noise up to which an effect explains the axis
-BETTER = 2.0  # innovation without the effect over that with it, at least
-CLEAN = 1.6  # innovation over the noise up to which next to nothing else is left in it,
-BETTER_AT_NOISE = 1.03  # replaces BETTER there: a gap of one encoder count makes 1.04 to 1.07
-TELLING = 0.005  # dry friction over the rms voltage from which it is named
+AT_NOISE = 3.5  # held-out innovation over encoder noise up to which an effect explains the axis
+BETTER = 2.0  # least ratio of the innovation without the effect to that with it
+CLEAN = 1.6  # innovation over noise up to which it contains hardly anything else;
+BETTER_AT_NOISE = 1.03  # replaces BETTER there: a gap of one encoder count gives 1.04 to 1.07
+TELLING = 0.005  # dry friction over rms voltage above which it is named
 
 FILTER_WORK = 2.0  # samples times sub-steps simulated in the time that the filter takes for one sample
 
@@ -40,7 +40,7 @@ def one_step_fit(
     """Fit an effect together with those of ``base`` by one-step prediction; excess is 0 if that explains the axis.
 
     new: additional effects, with start values; earlier: an earlier result without them; limits: see ``Limits``, bar in m/s.
-    Raises BadInput if it cannot.
+    Raises BadInput if ``base`` has an effect that cannot be included.
     """
     return filter_fit(data, base, effect, new, earlier, limits)[0]
 
@@ -78,7 +78,7 @@ def filter_fit(
 
 
 def _with_law(dry: DryFriction, law: Effect, values: tuple[float, ...], effect: Effect) -> DryFriction:
-    """Add a law of dry friction, in the place of its relatives and of the default friction of the effect."""
+    """Add a law of dry friction, which replaces those of its family and the default friction of the effect."""
     kept = [
         (own, its)
         for own, its, _ in dry.rows()
@@ -88,7 +88,7 @@ def _with_law(dry: DryFriction, law: Effect, values: tuple[float, ...], effect: 
 
 
 def _depends_on_time(effect: Effect) -> bool:
-    """Whether the law depends on time; the first stage is too short for such a law."""
+    """True if the law depends on time; the first stage is too short for such a law."""
     return any("t" in arguments(function) for function in effect.functions.values())
 
 
@@ -188,5 +188,5 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
 
 
 def error_without(data: AxisData, found: FilterFit) -> float:
-    """Held-out error one step ahead, m/s, of the same filter without the effect, all else refitted: what the effect must beat."""
+    """Held-out one-step error, m/s, of the same filter without the effect, all else refitted: the effect must have a smaller one."""
     return float(np.sqrt(np.mean(found.without[data.training :] ** 2))) * data.sampling_rate

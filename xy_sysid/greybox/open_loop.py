@@ -1,6 +1,6 @@
 """Free simulation of the position from the voltage alone, from the first sample to the last.
 
-This is the hardest test, because every small error in velocity adds up. Laws of position (cogging) use the measured position,
+This is the hardest test, because small errors in velocity add up. Position-dependent laws (cogging) use the measured position,
 as everywhere in this package.
 """
 
@@ -18,17 +18,17 @@ from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.samples.block import FloatArray
 
-ROUNDS = 40  # of the least squares
+ROUNDS = 40  # most rounds of least squares
 STEP = 1e-4  # of a parameter's size, for its derivative
-EDGE = 1e-9  # of a parameter's size, from its bound
-SLOW = ("friction", "bristle", "force", "input")  # categories that decide the slow motion, unless they go with position
+EDGE = 1e-9  # least distance from a bound, relative to a parameter's size
+SLOW = ("friction", "bristle", "force", "input")  # categories that determine the slow motion, unless the law depends on position
 
 
 @dataclass(frozen=True, slots=True)
 class OpenLoop:
     """Measured minus simulated position over a whole record, from its first sample.
 
-    error: (n,) m; speed: m/s by which the first sample's was off; rms, worst: m; share: rms over the standard deviation of the measured position
+    error: (n,) m; speed: error of the start speed, m/s; rms, worst: m; share: rms over the standard deviation of the measured position
     """
 
     error: FloatArray
@@ -39,14 +39,14 @@ class OpenLoop:
 
 
 def open_loop(sampling_rate: float, position: FloatArray, simulated: FloatArray, pole: float) -> OpenLoop:
-    """What a simulated velocity (n - 1,), m/s, makes of the position (n,), m, from the input alone.
+    """Error of the position (n,), m, that follows from a simulated velocity (n - 1,), m/s.
 
-    How far the speed at the first sample is off, which fades with the pole (rad/s), is estimated.
+    The error of the speed at the first sample, which decays with the pole (rad/s), is estimated.
     """
     started = _travelled(sampling_rate, _fading(sampling_rate, pole, simulated.size))
     drift = position - position[0] - _travelled(sampling_rate, simulated)
     lasting = float(started @ started)
-    speed = float(drift @ started) / lasting if lasting > 0.0 else 0.0  # a pole far above the sampling rate forgets it at once
+    speed = float(drift @ started) / lasting if lasting > 0.0 else 0.0  # with a pole far above the sampling rate it decays at once
     error = drift - speed * started
     rms, spread = _rms(error), float(np.std(position))
     share = rms / spread if spread > 0.0 else np.inf
@@ -54,7 +54,7 @@ def open_loop(sampling_rate: float, position: FloatArray, simulated: FloatArray,
 
 
 def from_input_alone(sampling_rate: float, position: FloatArray, simulated: FloatArray, pole: float) -> tuple[float, float]:
-    """(rms error of the position over the whole record, m; part 0..1 of the motion's power that is explained); see ``open_loop``."""
+    """(rms error of the position over the whole record, m; explained fraction 0..1 of the velocity's power); see ``open_loop``."""
     found = open_loop(sampling_rate, position, simulated, pole)
     measured = np.diff(position) * sampling_rate
     left = measured - simulated - found.speed * _fading(sampling_rate, pole, simulated.size)
@@ -70,9 +70,9 @@ def _fading(sampling_rate: float, pole: float, samples: int) -> FloatArray:
 def settled(data: AxisData, fitted: GreyboxFit) -> GreyboxFit:
     """The same effects with the mass, drag, friction and load that predict the whole record best, in velocity and position.
 
-    Output error (Ljung, System Identification, 2nd ed. 1999, sec. 7.2), with the speed at the first sample as one more unknown. What the
-    fast motion knows better stays as it was: delay, modes, and what goes with position. Errors on held-out data stay those of ``fitted``, as
-    now there is nothing that no fit saw. Values that moved have no interval (infinite): errors that add up are not independent.
+    Output error (Ljung, System Identification, 2nd ed. 1999, sec. 7.2), with the speed at the first sample as one more unknown. Delay, modes
+    and position-dependent effects are kept, since fast motion determines them better. Held-out errors remain those of ``fitted``, because this
+    fit uses all data. Changed values have no interval (infinite): accumulated errors are not independent.
     """
     model = fitted.model
     free = [name for name, _ in model.effects if _slow(model.library[name])]
@@ -108,7 +108,7 @@ def _slow(effect: Effect) -> bool:
 
 
 def _moved(model: AxisModel, free: list[str], values: FloatArray) -> AxisModel:
-    """Gain, pole and (behind the start speed) the parameters of the free effects, from one row."""
+    """The model with gain, pole and the parameters of the free effects from one row, whose third number is the start speed."""
     rest = iter(values[3:].tolist())
     effects = tuple((name, tuple(next(rest) for _ in row) if name in free else row) for name, row in model.effects)
     return replace(model, gain=float(values[0]), pole=float(values[1]), effects=effects)
@@ -124,7 +124,7 @@ def _with(data: AxisData, fitted: GreyboxFit, model: AxisModel, simulated: Float
 
 
 def _travelled(sampling_rate: float, velocity: FloatArray) -> FloatArray:
-    """(n,) m since the first sample."""
+    """(n,) distance since the first sample, m."""
     return np.concatenate(([0.0], np.cumsum(velocity) / sampling_rate))
 
 

@@ -1,7 +1,7 @@
 """The parameters of an axis model as one row of numbers: their simulation, bounds and scales, and the fitted model with its intervals.
 
-What may differ from one recording to the next (a load) stands in the row for the first recording, and behind all others what each later
-recording adds to it. The speed with which each begins is none of them: it is computed again at the start of each fit.
+A parameter that may differ between recordings (a load) is in the row with its value for the first recording; the end of the row holds
+the differences of each later recording. Start speeds are not parameters: they are computed again at the start of each fit.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.tables import Table
 
-BEGINS = 2000.0  # Hz: sub-steps in which a start is looked for
+BEGINS = 2000.0  # Hz: sub-steps for the estimation of start speeds
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """One parameter with its 95 % interval; of what each recording has for itself the mean, and ``recordings``, one by one."""
+    """One parameter with its 95 % interval; if it differs between recordings, their mean, and ``recordings`` holds each value."""
 
     name: str
     value: float
@@ -42,10 +42,10 @@ def parameter_table(parameters: tuple[Estimate, ...]) -> Table:
 
 @dataclass(frozen=True, slots=True)
 class FitProblem:
-    """What is fitted, to the first stage or to the whole.
+    """The parameters and simulation of a fit.
 
-    early: to the first stage; at: sub-steps, Hz -> simulation of a row of parameters; row: the model's; scale: how each may move
-    The row is as of ``simulator`` for the first recording; behind it is what those after it differ by in what each has for itself.
+    early: True for data of the first stage only; at: sub-steps, Hz -> simulation of a row of parameters; row: values of the model; scale: theirs
+    The row starts as that of ``simulator`` for the first recording; differences of later recordings follow.
     """
 
     early: bool
@@ -59,7 +59,7 @@ def problem(data: AxisData, model: AxisModel, early: bool) -> FitProblem:
     names, own = [name for name, _ in model.effects], _own(model)
     items = [item for name in names for item in model.library[name].on(data.similar)]
     places = np.array(own, dtype=np.int64)
-    known = all(len(values) == len(data.runs) for _, values in model.per_recording)  # else it comes from other recordings
+    known = all(len(values) == len(data.runs) for _, values in model.per_recording)  # otherwise they belong to other recordings
     models = [model.in_recording(k) if known else model for k in range(len(data.runs))]
     each = np.array([one.row for one in models])
     spans = [slice(run.start, run.start + count + 1) for run, count in zip(data.runs, data.counts(early), strict=True)]
@@ -112,7 +112,7 @@ def model_of(data: AxisData, start: AxisModel, values: FloatArray) -> AxisModel:
 
 
 def estimates(data: AxisData, model: AxisModel, scale: Scale, found: Solution) -> tuple[Estimate, ...]:
-    """Every parameter with its interval."""
+    """Every parameter with its 95 % interval."""
     inner, spread = scale.inner(found.values), Z95 * np.sqrt(np.diag(found.covariance))
     wide = Scale(np.where(scale.positive, scale.low, -np.inf), np.full_like(scale.high, np.inf), scale.positive, scale.unit)
     low, high = wide.outer(inner - spread), np.where(np.isinf(spread), np.inf, wide.outer(inner + spread))
@@ -139,17 +139,17 @@ def estimates(data: AxisData, model: AxisModel, scale: Scale, found: Solution) -
 
 
 def _spread_of_each(covariance: FloatArray) -> FloatArray:
-    """(r + 1,) standard deviation of a value in each of r recordings, and of their mean; covariance (r, r) of the first and of what others add."""
+    """(r + 1,) standard deviation of a value in each of r recordings, and of their mean; covariance (r, r) of the first and of the differences."""
     count = covariance.shape[0]
     ways = np.eye(count)
     ways[:, 0] = 1.0
     ways = np.vstack((ways, ways.mean(axis=0)))
     power = np.einsum("ij,jk,ik->i", ways, covariance, ways)
-    return np.asarray(np.sqrt(np.where(np.isnan(power), np.inf, np.maximum(power, 0.0))))  # nan: of what the data do not see at all
+    return np.asarray(np.sqrt(np.where(np.isnan(power), np.inf, np.maximum(power, 0.0))))  # nan: no influence on the data
 
 
 def _own(model: AxisModel) -> list[int]:
-    """Places in the row of a model's parameters of those that may differ from one recording to the next."""
+    """Indices in a model's row of the parameters that may differ between recordings."""
     items = (item for name, _ in model.effects for item in model.library[name].parameters)
     return [3 + k for k, item in enumerate(items) if item.per_recording]
 

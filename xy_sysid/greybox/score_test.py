@@ -1,7 +1,7 @@
 """The part of the error of a model that an effect would explain, to first order: a score test, with start values for the fit.
 
-An effect's trace is its force on the measured motion, passed through the base (Rao 1948, score test); what a change of
-gain, delay or pole would do is projected out first.
+An effect's trace is its force on the measured motion, passed through the base (Rao 1948, score test); the part that a change of
+the model's own parameters would explain is projected out first.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from xy_sysid.samples.block import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """share: part (0..1) of the whitened error's power that the effect's best trace explains; values: start of its parameters."""
+    """share: fraction (0..1) of the whitened error's power that the effect's best trace explains; values: start values of its parameters."""
 
     effect: str
     share: float
@@ -36,8 +36,8 @@ class Trace:
 class Screen:
     """The score test of several effects on one error, alone or together.
 
-    traces: largest share first; rows: of each effect in what follows, the columns of its best trace
-    inner: (bands, k, k) products of all columns in each band; seen: (bands, k) of the columns with the error; error: (bands,) of it with
+    traces: largest share first; rows: for each effect, the indices of the columns of its best trace in what follows
+    inner: (bands, k, k) products of all columns in each band; seen: (bands, k) of the columns with the error; error: (bands,) of the error with
     itself, whitened; power: (bands,) of the error
     """
 
@@ -51,25 +51,25 @@ class Screen:
 
     @cached_property
     def score(self) -> float:
-        """Of the error as it is, nats a line."""
+        """Score of the error, nats a line."""
         return self.objective.of_power(self.power)
 
     def gain(self, names: Iterable[str]) -> float:
-        """Nats a line by which effects lower the score to first order, each with its best trace: linear algebra alone."""
+        """Nats a line by which effects lower the score to first order, each with its best trace; no simulation."""
         rows = np.array([row for name in names for row in self.rows[name]], dtype=np.int64)
         inner, seen = self.inner[:, rows[:, None], rows], self.seen[:, rows]
         coefficients = np.linalg.lstsq(inner.sum(axis=0), seen.sum(axis=0), rcond=1e-8)[0]
         left = self.error - 2.0 * seen @ coefficients + np.einsum("bij,i,j->b", inner, coefficients, coefficients)
-        # 0 in bands that are not excited: the response there is unknown
+        # 0 in bands without excitation: the response there is unknown
         ratio = np.where(self.error > 0.0, np.maximum(left, 0.0) / np.maximum(self.error, 1e-300), 1.0)
         return self.score - self.objective.of_power(self.power * np.minimum(ratio, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
 class Projected:
-    """An error, as independent numbers (m,), without what the parameters that a model has already can make of it.
+    """An error, as independent numbers (m,), without the part that changes of the model's own parameters explain.
 
-    basis: (m, k) orthonormal, of what these parameters change; power: of the error that is left
+    basis: (m, k) orthonormal basis of these changes; power: of the remaining error
     """
 
     error: FloatArray
@@ -84,7 +84,7 @@ class Projected:
         return Projected(left, basis, float(left @ left) + 1e-300)
 
     def share(self, columns: FloatArray) -> tuple[float, FloatArray, FloatArray]:
-        """Part of the error's power that columns (k, m) explain, their coefficients, and the columns as they count, of size 1."""
+        """Fraction of the error's power that columns (k, m) explain, their coefficients, and the projected columns, normalised."""
         clean = columns - (columns @ self.basis) @ self.basis.T
         size = np.linalg.norm(clean, axis=1) + 1e-300
         clean /= size[:, None]
@@ -96,9 +96,9 @@ class Projected:
 def best_trace(
     effect: Effect, scene: Scene, space: Projected, guesses: Iterable[Guess], acting: Callable[[Guess], FloatArray]
 ) -> tuple[Trace, FloatArray | None]:
-    """The guess of an effect that explains most, and its columns as they count; none if no guess explains anything.
+    """The guess of an effect that explains most, and its projected columns; None if no guess explains anything.
 
-    acting: what a guess's columns do to the error, (k, m)
+    acting: change of the error by the columns of a guess, (k, m)
     """
     best, chosen = Trace(effect.name, 0.0, tuple(item.typical for item in effect.on(scene.similar))), None
     for guess in guesses:
@@ -112,7 +112,7 @@ def best_trace(
 def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, windows: Windows, least: Floor) -> Screen:
     """The best trace of each effect.
 
-    nuisance: (k, n) change of the model's velocity per unit of each parameter that it has already; windows: of the scene that are looked at
+    nuisance: (k, n) change of the model's velocity per unit of each of its parameters; windows: of the scene
     """
     objective, left = Objective.of(least), windows.layout.power(windows.spectrum(scene.error))
     weight = ((objective.lines > 0.0) / np.sqrt(objective.spectrum(left)))[windows.layout.band]
@@ -149,7 +149,7 @@ def screen(effects: Iterable[Effect], scene: Scene, nuisance: FloatArray, window
 
 
 def _of_each_recording(columns: FloatArray, effect: Effect, scene: Scene) -> FloatArray:
-    """(k, n) columns of a trace, or (k r, n) of an effect that each of r recordings has for itself."""
+    """(k, n) columns of a trace; (k r, n) for an effect with a separate parameter in each of r recordings."""
     if len(scene.recordings) < 2 or not any(item.per_recording for item in effect.parameters):
         return columns
     edges = np.cumsum([0, *scene.recordings])
@@ -167,12 +167,12 @@ def _by_band(rows: FloatArray, windows: Windows) -> FloatArray:
 
 
 def bounded(effect: Effect, values: Iterable[float], similar: Similarity) -> tuple[float, ...]:
-    """The values, moved into the bounds of the effect's parameters on a machine like this."""
+    """The values, clipped to the bounds of the effect's parameters on this machine."""
     return tuple(float(min(max(value, item.low), item.high)) for value, item in zip(values, effect.on(similar), strict=True))
 
 
 def _through_base(forces: FloatArray, scene: Scene) -> FloatArray:
-    """(k, n) V against the drive -> m/s, behind the base and what the motion passes."""
+    """(k, n) V against the drive -> m/s, behind the base and the sections of the motion."""
     b, a = mean_velocity_filter(scene.gain, scene.pole, scene.sampling_rate)
     moved = -scipy.signal.lfilter(b, a, forces, axis=1)
     for b0, b1, b2, a1, a2 in scene.sections:

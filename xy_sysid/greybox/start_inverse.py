@@ -1,7 +1,7 @@
 """Start values of base and effect together, from the measured motion by linear least squares, without local minima.
 
 The voltage is explained by acceleration, velocity and the effect's traces on the measured motion (inverse dynamic
-identification; Gautier & Khalil 1990, eq. 8), all seen through the same low-pass. This
+identification; Gautier & Khalil 1990, eq. 8), all with the same low-pass. This
 distinguishes friction from the drag of the base. At rest friction balances any drive, so a law of friction is determined from the samples
 in motion alone.
 """
@@ -20,8 +20,8 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.samples.block import FloatArray
 
 CUTOFFS = (10.0, 40.0)  # Hz: slow machines move below the first, quick ones up to the second
-REST = 0.2  # part of the usual speed below which friction may be holding it
-FEW = 0.05  # part of the samples that must be in motion, else all are used
+REST = 0.2  # fraction of the velocity's standard deviation below which friction may hold the axis
+FEW = 0.05  # least fraction of samples in motion; otherwise all samples are used
 
 
 def cutoffs(sampling_rate: float) -> list[float]:
@@ -31,7 +31,7 @@ def cutoffs(sampling_rate: float) -> list[float]:
 
 @dataclass(frozen=True, slots=True)
 class InverseStart:
-    """gain: m/s/V; pole: rad/s; values: of the effect's parameters; sizes: of each force beside it, over what it was."""
+    """gain: m/s/V; pole: rad/s; values: of the effect's parameters; sizes: factor on each force of the model."""
 
     gain: float
     pole: float
@@ -42,10 +42,10 @@ class InverseStart:
 def inverse_starts(
     effect: Effect, scene: Scene, samples: int, forces: Sequence[FloatArray] = (), with_friction: bool = False, least: float = 0.0
 ) -> list[InverseStart]:
-    """One for each low-pass at most, from the first samples.
+    """At most one start for each low-pass, from the first ``samples``.
 
-    forces: (n,) V each, of what the model has already, whose sizes are free; with_friction: dry friction is among them
-    least: part of what is left of the voltage that the effect must take away
+    forces: (n,) V each, of the model's own effects, whose sizes are free; with_friction: True if dry friction is among them
+    least: fraction of the residual voltage that the effect must explain
     """
     if effect.guesses is None or effect.is_behind:
         return []
@@ -99,7 +99,7 @@ def rigid_starts(scene: Scene) -> list[tuple[float, float]]:
 
 @lru_cache(maxsize=4)
 def _motion(scene: Scene, samples: int, cutoff: float) -> tuple[LowPass, FloatArray, FloatArray, FloatArray]:
-    """The low-pass, and acceleration, velocity and voltage through it: the same for all effects."""
+    """The low-pass, and filtered acceleration, velocity and voltage: the same for all effects."""
     slow = LowPass.of(samples, scene.sampling_rate, cutoff)
     velocity, voltage = (scipy.fft.rfft(signal[:samples]) for signal in (scene.velocity, scene.voltage))
     return slow, slow(velocity, derived=True), slow(velocity), slow(voltage)
@@ -107,9 +107,9 @@ def _motion(scene: Scene, samples: int, cutoff: float) -> tuple[LowPass, FloatAr
 
 @dataclass(frozen=True, slots=True)
 class LowPass:
-    """Signals below a frequency, at a rate that just carries them: the response of a Butterworth filter forth and back, no shift in time.
+    """Low-pass with a reduced sampling rate: a Butterworth filter forward and backward, without phase shift.
 
-    lines: weight of each line of the spectrum that is kept; turn: rad/s of each; size: samples that come out; rate: Hz, of these
+    lines: weight of each kept line of the spectrum; turn: rad/s of each; size: number of output samples; rate: their sampling rate, Hz
     """
 
     lines: FloatArray
@@ -120,7 +120,7 @@ class LowPass:
 
     @staticmethod
     def of(samples: int, sampling_rate: float, cutoff: float) -> LowPass:
-        """For the first samples of signals."""
+        """A low-pass for the first ``samples`` of signals."""
         kept = min(int(3.0 * cutoff / sampling_rate * samples) + 1, samples // 2)
         frequency = np.arange(kept + 1) * sampling_rate / samples
         lines = 1.0 / (1.0 + (frequency / cutoff) ** 4)
@@ -132,7 +132,7 @@ class LowPass:
         return np.asarray(scipy.fft.irfft(kept * (1j * self.turn if derived else 1.0), self.size) * (self.size / self.samples))
 
     def inside(self) -> NDArray[np.bool_]:
-        """(size,) where the ends, which the transform takes for neighbours, do not reach."""
+        """(size,) False near the ends, which the transform treats as neighbours."""
         rows = np.ones(self.size, dtype=np.bool_)
         ends = max(self.size // 50, 1)
         rows[:ends] = rows[-ends:] = False
@@ -140,7 +140,7 @@ class LowPass:
 
 
 def _least(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:
-    """Coefficients (k,) of rows (k, n) that explain the target (n,) best, and the squares left."""
+    """Coefficients (k,) of rows (k, n) that explain the target (n,) best, and the residual sum of squares."""
     size = np.linalg.norm(rows, axis=1) + 1e-300
     unit = rows / size[:, None]
     coefficients = np.linalg.lstsq(unit @ unit.T, unit @ target, rcond=1e-12)[0]

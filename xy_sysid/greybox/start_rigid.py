@@ -1,7 +1,7 @@
 """Gain, delay and pole of a rigid axis from its frequency response, without a start value.
 
-For each pole the delay is read off the phase and the gain off the size of one complex correlation; the pole that leaves
-least is taken. The response is that of the mean velocity per sample behind a zero-order hold, exactly.
+For each pole, delay and gain follow from complex correlations with the response; the pole with the smallest
+residual is chosen. The model is the exact response of the mean velocity per sample behind a zero-order hold.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import scipy
 from xy_sysid.samples.block import FloatArray
 
 POLES = np.geomspace(3.0, 5000.0, 80)  # rad/s
-FEWEST_LINES = 16.0  # samples of a window at least, where those of two seconds are fewer
-LONGEST_DELAY = 40  # samples; a drive that answers later is not identified without a start value
+FEWEST_LINES = 16.0  # least samples of a window, for low sampling rates or short data
+LONGEST_DELAY = 40  # samples; a longer delay needs a start value
 
 
 def mean_velocity_filter(gain: float, pole: float, sampling_rate: float) -> tuple[FloatArray, FloatArray]:

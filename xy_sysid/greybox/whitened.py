@@ -1,6 +1,6 @@
-"""One step ahead without a filter: the error of a free simulation, predicted from its own past by an autoregressive model.
+"""One-step prediction without a filter: the error of a free simulation, predicted from its past by an autoregressive model.
 
-A fair rival of every one-step prediction: it, too, follows whatever the physics leaves out (Ljung, System Identification,
+A fair baseline for any one-step prediction, because it also predicts the effects that the model lacks (Ljung, System Identification,
 2nd ed., sec. 3.2 and 10.1).
 """
 
@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
-ORDER = 60  # past samples of which one is predicted: 30 ms at 2 kHz
-RIDGE = 1e-12  # of the power: for an error that is exactly predictable
+ORDER = 60  # number of past samples that predict the next: 30 ms at 2 kHz
+RIDGE = 1e-12  # relative to the power, for an exactly predictable error
 
 
 def whitened_rms(error: FloatArray, held: NDArray[np.bool_], order: int = ORDER) -> float:
-    """rms, in the unit of ``error``, of what an autoregressive model leaves of it on samples that its fit did not see.
+    """rms of the one-step error of an autoregressive model on held-out samples, in the unit of ``error``.
 
-    error: (n,) measured minus simulated, evenly sampled; held: (n,) True where it is judged; the rest is what it is fitted to,
-    by least squares. A model in velocity is that in position: the last position is measured. Raises BadInput.
+    error: (n,) measured minus simulated, evenly sampled; held: (n,) True for held-out samples; the model is fitted to the others
+    by least squares. Velocity and position give the same prediction, since the last position is measured. Raises BadInput for bad arrays.
     """
     if error.shape != held.shape or error.ndim != 1:
         raise BadInput("shape of error and held", f"{error.shape} and {held.shape}", "one and the same (n,)", "Give one flag a sample.")
@@ -47,13 +47,13 @@ def whitened_rms(error: FloatArray, held: NDArray[np.bool_], order: int = ORDER)
 
 
 def enough(held: NDArray[np.bool_], order: int = ORDER) -> bool:
-    """Whether there are samples to fit an autoregressive model, and to judge it; held: (n,) True where it is judged."""
+    """True if there are enough samples to fit an autoregressive model and to judge it; held: (n,) True for held-out samples."""
     runs, judged = _used(held, order)
     return order >= 1 and sum(b - a - order for a, b in runs) >= 4 * order and bool(np.any(judged))
 
 
 def _used(held: NDArray[np.bool_], order: int) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
-    """Stretches that are fitted, each longer than the order, and (n,) the samples that are judged."""
+    """Fitted stretches, each longer than the order, and (n,) True for the samples that are judged."""
     judged = held.copy()
     judged[:order] = False
     return [(a, b) for a, b in _runs(~held) if b - a > order], judged
@@ -66,7 +66,7 @@ def _runs(wanted: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _products(error: FloatArray, order: int) -> FloatArray:
-    """(order + 1, order + 1): sums of e[t - i] e[t - j] over t = order .. end. One row by sums, the rest from what enters and leaves."""
+    """(order + 1, order + 1): sums of e[t - i] e[t - j] over t = order .. end. One row by sums, the rest from the samples that enter and leave."""
     n = error.size
     found = np.empty((order + 1, order + 1))
     found[0] = [error[order:] @ error[order - lag : n - lag] for lag in range(order + 1)]

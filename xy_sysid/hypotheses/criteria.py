@@ -41,7 +41,7 @@ OVERLAP = _number("overlap", 1.5, "windows", "half-overlapping Hann windows per 
 WHITE = _number("white", 0.01, "1", "probability that white noise on the input is taken for a missing effect")
 DOUBTFUL = _number("doubtful", 0.1, "1", "a rival is mentioned if it predicts as well with at least this probability")
 SIZE = _number("size", 0.7, "1", "least size of an effect; an unmodelled force could imitate a smaller one")
-RICHER = _number("richer", 0.25, "1", "least size of what a richer law explains beyond the simpler one in whose place it is")
+RICHER = _number("richer", 0.25, "1", "least size of a richer law compared with the simpler one that it replaces")
 WIDTH = _number("width", 6, "moves", "most swaps, and most pairs, from one set; the true one was among the first four")
 ALMOST = _number(
     "almost", 0.7, "1", "ratio above which two gains or sizes are almost equal: dry friction is then named first, a pair promises no more"

@@ -87,7 +87,7 @@ def interpolation(nodes: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def nodes_for(highest: float, digits: float = 11.0) -> FloatArray:
-    """Chebyshev nodes on [0, highest] (x, in sampling rates) that resolve aliases of poles below ``highest`` to so many digits."""
+    """Chebyshev nodes on [0, highest] (x, in sampling rates) that resolve aliases of poles below ``highest`` to this many digits."""
     top = min(max(highest, 1e-3), 0.5)
     nearest = max(2.0 / top - 3.0, 1.02)
     rate = nearest + math.sqrt(nearest**2 - 1.0)

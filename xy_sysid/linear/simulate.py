@@ -157,7 +157,7 @@ def discrete(tf: TransferFunction, sampling_rate: float) -> TransferFunction:
     )
 
 
-RUNS_AWAY = -1e5  # per cent: for an error of a thousand times the motion no number is given
+RUNS_AWAY = -1e5  # per cent; below it (an error of a thousand times the motion) no number is given
 
 
 @dataclass(frozen=True, slots=True)

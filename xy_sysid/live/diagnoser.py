@@ -62,7 +62,7 @@ class Diagnoser:
         self._queue: deque[_Request] = deque()
         self._answers: list[Reply] = []
         self._data: dict[str, Run] = {}
-        self._ends: dict[str, tuple[Newest, float]] = {}  # for each axis the hearing and its time in s when its samples were taken
+        self._ends: dict[str, tuple[Newest, float]] = {}  # for each axis the received data, and their end in s when its samples were taken
         self.under_way = ""  # the axis of the current job
         self._number = 0
         self.reset()

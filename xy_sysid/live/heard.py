@@ -14,7 +14,7 @@ class Heard:
     """What arrived since the last check.
 
     silent:    streams without a message
-    paired:    samples that were paired
+    paired:    number of paired samples
     refused:   reason for the newest refused message, empty without one; refusals: their number since the start
     stamps:    why stamped samples cannot be counted, empty if they can
     sentences: messages of the pairing, by reason

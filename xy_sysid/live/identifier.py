@@ -28,7 +28,7 @@ from xy_sysid.settings import IdentifierSettings
 from xy_sysid.units import USUAL, Units
 
 STATE_VERSION = 1
-CUTS = ("time_jump", "restart", "unequal_rates")  # gaps after which the line through the time stamps is another one
+CUTS = ("time_jump", "restart", "unequal_rates")  # gaps after which a new line is fitted to the time stamps
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Watches a resonance: has it moved since its first value?
 
-Loose base bolts lower the base's stiffness, so that its antiresonance and resonance frequencies fall (the paper's finding).
+Loose base bolts lower the base's stiffness, so that its antiresonance and resonance frequencies fall (finding of the paper).
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ class Numbers:
             self._facts = ui.element("div").classes("facts")
 
     def refresh(self, session: Session, source: Source, axis: str, view: View) -> None:
-        """Update them if they have changed."""
+        """Update the numbers if they have changed."""
         heard = session.heard.version.get(f"axis {axis}", 0) if view.linear else 0
         stamp = (source.key, axis, source.stamp(axis), view, heard, chosen_units())
         if stamp == self._shown:

@@ -91,7 +91,7 @@ class Panel:
         self._add_wanted()
         begun = source.document(self._axis) is not None
         waits = self._control is not None and self._control.refresh(self._axes, begun)
-        axis, view = self._axis, self._choose()  # without an axis every card keeps its space and says what it waits for
+        axis, view = self._axis, self._choose()  # without an axis every card keeps its space and shows what it waits for
         self._use.refresh()
         self._numbers.refresh(self._session, source, axis, view)  # first the parts that wait for nothing: the browser may disconnect meanwhile
         await self._story.refresh(axis, quiet=waits)

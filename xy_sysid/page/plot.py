@@ -24,7 +24,7 @@ class Plot:
     """One figure in one browser, with an explanation and download buttons."""
 
     def __init__(self, reading: str, name: str = "figure", height: int = 200) -> None:
-        """height: px of the figures that it will show; the space is reserved."""
+        """height: of its figures, px; the space is reserved."""
         self._empty = {"data": [], "layout": {"height": height, "xaxis": HIDDEN, "yaxis": HIDDEN, **EMPTY}, "config": CONFIG}
         self._shown: object = None
         self._said = ""

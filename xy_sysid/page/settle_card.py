@@ -16,7 +16,7 @@ ABOUT = "Designs the experiment that distinguishes what the data leave open, wit
 
 
 class SettleCard:
-    """The card beside the story of the machine."""
+    """The card next to the story of the machine."""
 
     def __init__(self, session: Session) -> None:
         self._session, self._axis = session, ""

@@ -93,7 +93,7 @@ class Settling:
         self._thread.start()
 
     def attend(self, live: Live | None) -> None:
-        """Start automatically if the page was started so, once the axis is driven and its rigid model is shown; let the story explain the end."""
+        """Start once the wished axis is driven and has a rigid model; at the end request ``auto`` for its story."""
         if live is None or not self.wished:
             return
         if not self.steps and not self.running and live.heard.driving() and live.document(self.wished) is not None:

@@ -1,4 +1,4 @@
-"""Which model of an axis is shown: the story's newest once there is a story, else the identifier's linear fit; others by a click."""
+"""The shown model of an axis: the story's newest, or without a story the identifier's linear fit; the user can choose others."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 from xy_sysid.report.story_parts import words
 
 NOW, RIGID, LINEAR = "now", "rigid", "linear"
-AWAITED = "rigid, with delay"  # how the first model of a story is called
+AWAITED = "rigid, with delay"  # name of the first model of a story
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """linear: what the identifier publishes; step: of the story, None for the newest."""
+    """A shown model. linear: True for the identifier's fit; step: index in the story, None for the newest."""
 
     linear: bool = False
     step: int | None = None
 
 
 def views(document: Mapping[str, Any] | None, live: bool, awaited: bool = False) -> dict[str, str]:
-    """What can be chosen, with its name; the first is what is shown unasked. awaited: the rigid model will come."""
+    """The models to choose from, with their names; the first is the default. awaited: True if a rigid model will arrive."""
     steps = document["steps"] if document is not None else []
     found: dict[str, str] = {}
     if steps:

@@ -1,4 +1,4 @@
-"""The question before the machine moves."""
+"""The confirmation before the machine moves."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ SIMULATED = "ballscrew"  # node of the simulated machine
 
 
 def ask(session: Session, words: str, button: str, part: str, go: Callable[[], object]) -> None:
-    """Call ``go`` if the user agrees that a real machine moves; a simulated one may go at once.
+    """Call ``go`` once the user has agreed that a real machine moves; for a simulated one, at once.
 
-    words: what to expect; button: label of the button that agrees; part: its data-act
+    words: the expected motion; button: label of the button that agrees; part: its data-act
     """
     if SIMULATED in session.heard.present:
         go()

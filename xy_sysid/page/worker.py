@@ -1,6 +1,6 @@
-"""One recording in a process of its own: the page stays quick however long a fit takes, and a fit can be left.
+"""One recording in a separate process, so that a long fit does not block the page and can be cancelled.
 
-Stories are values that do not change: whoever leaves a fit half way still has the story from before.
+Stories are immutable: after a cancelled fit the previous story is still there.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ LEAVE = signal.SIGUSR1
 
 
 class Left(BaseException):
-    """The fit that runs is not wanted any more."""
+    """The running fit was cancelled."""
 
 
 class Desk:
-    """The recording, its stories, and what is done with them. Runs in the worker's process."""
+    """The recording, its stories, and the orders on them. Runs in the worker's process."""
 
     def __init__(self, path: Path, reading: Reading, say: Callable[[WorkerNews], None]) -> None:
         from xy_sysid.files.effects import library
@@ -55,7 +55,7 @@ class Desk:
         say(WorkerNews("opened", content=told))
 
     def do(self, order: Order) -> None:
-        """One order, as the node and the replay do theirs (``story.acts``); raises XySysidError in a sentence, or Left."""
+        """Carry out one order, as the node and the replay do (``story.acts``). Raises XySysidError with a sentence, or Left."""
         from xy_sysid.greybox.free_run import EPSILON
         from xy_sysid.samples.moves import several_moves
         from xy_sysid.story.acts import Job
@@ -67,7 +67,7 @@ class Desk:
         if story is None:
             self._perform(order, Job(act="begin", run=runs[0], story=None, effects=(), tolerance=EPSILON, more=runs[1:]))
             story = self._stories[order.axis]
-        if order.act == "diagnose":  # the data are the same as before: the model stays what it is
+        if order.act == "diagnose":  # the data are the same as before: the model is kept
             self._keep(order, diagnosed(story, runs, self._library, time.process_time))
         elif order.act == "add":
             self._keep(order, added(story, runs, order.argument, self._library))
@@ -77,7 +77,7 @@ class Desk:
             self._perform(order, Job(act=ACTS[order.act], run=runs[0], story=story, effects=story.effects, tolerance=EPSILON, more=runs[1:]))
 
     def _perform(self, order: Order, job: Job) -> None:
-        """Each step is shown as it comes."""
+        """Perform a job, and report each step."""
         from xy_sysid.story.acts import perform
 
         for _, made in perform(job, self._library, time.process_time):
@@ -92,7 +92,7 @@ class Desk:
 
 
 def main(path: str, reading: Reading, orders: Connection, words: Connection) -> None:
-    """The worker's process: orders in, news out, until its parent process has ended."""
+    """Main loop of the worker's process: orders in, news out, until its parent process has ended."""
     busy = [False]
 
     def leave(_number: int, _frame: FrameType | None) -> None:
@@ -101,7 +101,7 @@ def main(path: str, reading: Reading, orders: Connection, words: Connection) -> 
             raise Left
 
     def say(news: WorkerNews) -> None:
-        """Whole, or not at all: half a message would end all talk."""
+        """Send completely: a cancellation must not leave half a message in the pipe."""
         at_work, busy[0] = busy[0], False
         words.send(news)
         busy[0] = at_work

@@ -11,7 +11,7 @@ import threading
 from xy_sysid.live.fitter import LiveFitter, Update
 from xy_sysid.live.identifier import FitRequest
 
-MOST_WAITING = 64  # waiting requests at most; above, the oldest is dropped and counted (results are then no longer bit-for-bit reproducible)
+MOST_WAITING = 64  # most waiting requests; above, the oldest is dropped and counted (results are then no longer bit-for-bit reproducible)
 
 
 class FitWorker:

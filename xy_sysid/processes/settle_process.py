@@ -21,7 +21,7 @@ NICE = 10  # niceness of the process: receiving data has priority
 
 @dataclass(frozen=True, slots=True)
 class DecisionNews:
-    """part: finished fraction of the design; step: document of the decided step; problem: why there is none."""
+    """Report of the process. part: finished fraction of the design; step: document of the decided step; problem: why there is none."""
 
     part: float = 0.0
     step: dict[str, Any] | None = None

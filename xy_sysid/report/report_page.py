@@ -55,7 +55,7 @@ class Recorded:
     """Information about the recording itself.
 
     cover: title, machine, author, date; units: of input and output; facts: (what, value) of the experiment
-    origins: label -> provenance; notes: what was odd while reading
+    origins: label -> provenance; notes: anomalies found while reading
     coupling: how two axes that were driven at the same time affect each other; None for one axis, or if the notes give a reason
     """
 

@@ -22,10 +22,10 @@ ANEW: tuple[Act, ...] = ("diagnose", "renew")  # acts that start a new story
 class Job:
     """A job for one axis.
 
-    act: ``begin`` fits the rigid model if there is no story yet, ``diagnose`` begins again with these samples and then has ``effects`` in
-    the model, ``renew`` does so without asking what is missing, ``effects`` changes the effects and keeps the samples, ``add_next`` adds the
-    best one, ``auto`` all that help
-    run: of the axis; story: so far, None to begin; more: further stretches of the same axis
+    act: ``begin`` fits the rigid model if there is no story yet; ``diagnose`` starts again with these samples and then adds ``effects`` to
+    the model; ``renew`` does this without a diagnosis; ``effects`` changes the effects and keeps the samples; ``add_next`` adds the
+    best effect, ``auto`` all that help
+    run: of the axis; story: its present story, None to begin; more: further stretches of the same axis
     """
 
     act: Act

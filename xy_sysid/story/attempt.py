@@ -17,7 +17,7 @@ NO_MEMORY = "There is not enough memory for this step, and the model stays as it
 
 
 class Attempt:
-    """``with attempt: ...``. problem: the sentence, empty on success; detail: type, text and place of an unforeseen error, for a log.
+    """Context for a calculation. problem: the sentence, empty on success; detail: type, text and place of an unforeseen error, for a log.
 
     Errors of a broken pipe or file are raised: they end the process that uses it.
     """

@@ -173,9 +173,9 @@ def pictures(data: AxisData, fitted: GreyboxFit, shown: Measured) -> Pictures:
 
 
 def _compared(data: AxisData, fitted: GreyboxFit) -> Comparison:
-    """The comparison on held-out samples; by bands alone if there are few.
+    """The comparison on held-out samples; only by bands if there are few samples.
 
-    A model that is judged one sample ahead fails where it is above what counts as explained there.
+    A model that is judged by one-step prediction fails only where its error is above ``AT_NOISE``.
     """
     first = data.training if fitted.one_step else 0
     unseen = Unseen(

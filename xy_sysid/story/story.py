@@ -36,10 +36,10 @@ HELPS_NO_MORE = "No effect of the library helps any further."
 class Story:
     """The story of one axis.
 
-    rungs: the fits so far, the rigid base first; empty if the data do not suffice (``diagnosis`` then says what lacks); pictures: of each
-    diagnosis: what is missing in the base, None before it was asked; tolerance: of the signal, in the noise floor
+    rungs: the fits so far, the rigid base first; empty if the data do not suffice (``diagnosis`` gives the reason); pictures: of each fit
+    diagnosis: of the rigid base, None before it was requested; tolerance: fraction of the signal that is part of the noise floor
     stretch: the place of the stretch that the story is about, if it is about one of several
-    note: why the last action failed, or what it left out; empty otherwise
+    note: why the last action failed, or which part of the data it used; empty otherwise
     """
 
     axis: str

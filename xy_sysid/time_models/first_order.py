@@ -36,11 +36,11 @@ Term = Literal["friction", "load", "offset"]
 class FirstOrder:
     """The result of short tests of an axis.
 
-    quantities:  gain, time constant, delay, then those of friction, load and offset (both in one) that the data tell; and kV, kA, kS
-    levels:      of the input that last; both_ways: it moves in both directions; settled: time constants that the longest level lasts
-    error:       rms of what the model leaves, in the speed's unit; explained: part of the speed's power about its mean
-    repeats:     s over which what is left goes on: more than a few samples is no noise; seconds: of the recordings that were used
-    longest_delay: that was looked for, s; an interval that reaches it tells nothing
+    quantities:  gain, time constant, delay, then friction, load or offset (load and friction in one) if the data determine them; kV, kA, kS
+    levels:      number of levels of the input; both_ways: True if it moves both ways; settled: duration of the longest level in time constants
+    error:       rms of the residual error, in the speed's unit; explained: fraction of the speed's power about its mean
+    repeats:     s for which the residual is correlated: more than a few samples is not noise; seconds: of the recordings that were used
+    longest_delay: largest tested delay, s; an interval that reaches it determines nothing
     measured, simulated: (n,) speeds of all recordings
     """
 
@@ -243,7 +243,7 @@ def _run(u: FloatArray, rate: float, gain: float, constant: float, delay: float,
                     side = 1.0 if v > 0.0 else -1.0
                 end = drive - side * hold
                 after = end + (v - end) * np.exp(-left / constant)
-                if after * side < 0.0:  # it stops on the way
+                if after * side < 0.0:  # it stops within this step
                     left -= constant * np.log((v - end) / (-end))
                     v = 0.0
                 else:

@@ -48,9 +48,9 @@ def told_table(items: Sequence[Told]) -> Table:
 class Minimized:
     """A minimum.
 
-    values: (p,); covariance: (p, p), infinite on the diagonal where the data tell nothing; error: (n,) measured minus simulated
-    independent: how many independent numbers the error is worth; cost: rms of the error
-    weakest: (p,) the combination of parameters, in standard deviations, that the data tell least; flatness: its singular value, of the largest
+    values: (p,); covariance: (p, p), infinite on the diagonal for undetermined parameters; error: (n,) measured minus simulated
+    independent: effective number of independent samples of the error; cost: rms of the error
+    weakest: (p,) the least determined combination of scaled parameters; flatness: its singular value relative to the largest
     """
 
     values: FloatArray
@@ -75,12 +75,12 @@ class Minimized:
         return independent * float(np.log(max(self.cost, 1e-300))) + 0.5 * self.values.size * float(np.log(max(independent, 2.0)))
 
     def parameter(self, name: str, place: int, unit: str, low: float, high: float) -> Told:
-        """A parameter that the fit looked for between two bounds, in which its interval lies, too."""
+        """A parameter with bounds; its interval is clipped to them."""
         found = self.quantity(name, float(self.values[place]), np.eye(self.values.size)[place], unit)
         return replace(found, low=max(found.low, low), high=min(found.high, high))
 
     def quantity(self, name: str, value: float, slope: FloatArray, unit: str = "", positive: bool = False) -> Told:
-        """A function of the parameters with its interval, by its derivatives (p,) to them; positive: the interval is one of its logarithm."""
+        """A function of the parameters with its interval, from its derivatives (p,); positive: the interval is that of its logarithm."""
         variance = float(slope @ self.covariance @ slope) if np.all(np.isfinite(self.covariance)) else np.inf
         if not np.isfinite(variance):
             return Told(name=name, value=value, low=0.0 if positive else -np.inf, high=np.inf, unit=unit)
@@ -92,7 +92,7 @@ class Minimized:
 
 
 def shortest(found: Sequence[Minimized]) -> int:
-    """Index of the solution with the shortest description, among models of one record all of whose parameters are determined."""
+    """Index of the solution with the shortest description, among those of one record whose parameters are all determined."""
     told = [k for k, item in enumerate(found) if item.tells] or [len(found) - 1]
     independent = max(found[k].independent for k in told)
     return min(told, key=lambda k: found[k].length(independent))

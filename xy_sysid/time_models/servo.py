@@ -39,9 +39,9 @@ class Servo:
 
     quantities:   stiffness (kp / inertia), damping (kd and damping of the joint, / inertia), friction, load, limit (/ inertia), delay; then
                   frequency (Hz) and damping_ratio of the closed loop
-    at_limit:     part of the time at which the torque is at its limit, 0 where none is told; reached: the most that was asked for, / inertia
-    error, explained: rms of the angle's error, and part of its power explained, on recordings that no fit saw; fitted_error: on the others
-    resolution:   step of the angle's sensor; recordings: how many were used
+    at_limit:     fraction of the time with the torque at its limit, 0 without one; reached: largest requested torque / inertia
+    error, explained: rms of the angle's error and explained fraction of its power, on held-out data; fitted_error: rms on the fitted data
+    resolution:   step of the angle's sensor; recordings: number of used recordings
     """
 
     quantities: tuple[Told, ...]
@@ -174,7 +174,7 @@ def _run(
     start: float,
     speed: float,
 ) -> FloatArray:
-    """(n,) angles at the instants of held targets (n,); before the first, the target was where the joint stands."""
+    """(n,) angles at the instants of held targets (n,); before the first, the target was the start angle."""
     steps = int(np.ceil(1.0 / (rate * FINEST)))
     dt = 1.0 / (rate * steps)
     late = delay * rate

@@ -1,12 +1,12 @@
-"""Motor and table are coupled through a gap.
+"""Backlash: motor and table are coupled through a gap.
 
 contact:         its fit by one-step prediction, in stages
-innovations:     what the filter leaves, as a function of numbers that a solver moves
-starts:          where a fit begins
+innovations:     innovations of the filter, as a function of the fitted numbers
+starts:          start values of a fit
 contact_filter:  the compiled filter for the laws of dry friction that act with it
-filter_source:   its text, written from these laws
-filter_template: the frame of that
-filter_parts:    force of the contact, and the covariance's next step
+filter_source:   its source text, made from these laws
+filter_template: template of that text
+filter_parts:    contact force, and the step of the covariance
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def advance(
 ) -> tuple[float, float, float]:
     """(voltage that acts on the whole mass, motor minus table, speed of the table) after ``h`` s.
 
-    The motor feels the voltage, its part of the drag and the contact; the table the contact and its part of the drag.
+    Voltage, contact and a part of the drag act on the motor; contact, the other part of the drag and dry friction act on the table.
     """
     reduced = share * (1.0 - share)
     depth = apart - min(max(apart, -0.5 * gap), 0.5 * gap)
@@ -57,7 +57,7 @@ def advance(
 
 
 def guesses(scene: Scene) -> Iterator[Guess]:
-    """One start: what a gap does cannot be told from the measured motion alone."""
+    """One start value: the measured motion alone does not show the trace of a gap."""
     missing = scene.direction() * abs(scene.missing_force())
     yield Guess(columns(missing), lambda c: (20e-6, 0.5, 1500.0, 0.2, 5.0, 0.03, 0.0, 0.0))
 

@@ -1,7 +1,7 @@
 """Gap, masses and contact of an axis with backlash, fitted by one-step prediction.
 
-Contact is chaotic: free simulations of the same gap part within milliseconds, so a model with backlash can only be judged
-by how well it predicts the next sample from what was measured up to now (one-step prediction; Ljung, System
+Contact is chaotic: free simulations of the same gap diverge within milliseconds, so a model with backlash can only be judged
+by its prediction of the next sample from all earlier samples (one-step prediction; Ljung, System
 Identification, 2nd ed., sec. 3.2). The filter that predicts is in ``filter_template``.
 """
 
@@ -19,19 +19,19 @@ from xy_sysid.effects.backlash.usual_machine import from_usual, to_usual, usual
 from xy_sysid.samples.block import FloatArray
 
 RIGID = (CLOSED, 0.4, 1500.0, 0.1, 0.0, 0.03, 0.0, 0.0)  # no gap
-SOFT = 10.0  # rad/s of the spring at least that may take the place of the gap
-SEEN, LEFT = 2.5, 1.5  # encoder noises, and innovations, that a gap must have to be one
+SOFT = 10.0  # rad/s, lower bound of the contact that replaces the gap in the fit without it
+SEEN, LEFT = 2.5, 1.5  # least gap, in encoder noises, and in rms innovations
 WHOLE = View(samples=1_000_000, process_noise_factor=0.5, sub_steps=4)
 PROCESS_NOISE_FACTORS = (1.0, 0.3, 0.1, 0.03)  # factors on the process noise to choose from: the one that predicts the first stage best
-BEHIND = 1.5  # held-out innovation over the bar after the first fits, at which it is given up. Development draws, and machines of another make:
-# true gaps 0.1 to 1.1; where there is none 1.2 to 18
-IDLE = 0.9  # innovation with a gap over that without it, after the first fits, from which it does nothing, and must be at the bar. The same
-# machines: gaps that were found in the end 0.04 to 0.82, without one mostly 0.95 to 1.1
+BEHIND = 1.5  # held-out innovation over the bar after the first fits, above which the fit is given up. Development draws and other machines:
+# true gaps 0.1 to 1.1; no gap 1.2 to 18
+IDLE = 0.9  # innovation with a gap over that without it, after the first fits, above which the gap has no effect, and must reach the bar. The same
+# machines: gaps that were finally found 0.04 to 0.82; no gap mostly 0.95 to 1.1
 OWN, GAP, HERTZ = len(NAMES), NAMES.index("gap"), NAMES.index("hertz")
 
 
 class Contact:
-    """Gap, masses and contact from the innovations of the first samples, judged on those after the training."""
+    """Fits gap, masses and contact to the innovations of the first samples; samples after the training are held out."""
 
     def fit(self, task: OneStepTask) -> FilterFit:
         """See ``OneStep``."""
@@ -58,7 +58,7 @@ class Contact:
 
     @staticmethod
     def _predicted(fit: Innovations, inner: FloatArray, task: OneStepTask) -> tuple[float, FloatArray]:
-        """The factor on the process noise with which the filter predicts the first stage best, and all innovations with it."""
+        """The process-noise factor that predicts the first stage best, and all innovations with it, over the encoder noise."""
         first, training, n = task.stages
         sizes = {factor: _rms(fit.innovations(inner, View(min(first, training), factor))) for factor in PROCESS_NOISE_FACTORS}
         best = min(PROCESS_NOISE_FACTORS, key=lambda factor: sizes[factor])
@@ -102,7 +102,7 @@ class Contact:
 
     @staticmethod
     def _first_fit(fit: Innovations, task: OneStepTask) -> FloatArray:
-        """Coordinates after the first fit: from an earlier result, or from a grid, because a fit cannot open a gap that has closed."""
+        """Coordinates after the first fit: from an earlier result, or from a grid, because a fit cannot reopen a closed gap."""
         earlier = task.earlier
         if earlier is None or earlier.too_small:
             return best_of_grids(fit, task)
@@ -111,7 +111,7 @@ class Contact:
 
     @staticmethod
     def _start_without_gap(fit: Innovations, rigid: FloatArray, best: FloatArray, view: View) -> FloatArray:
-        """Start of the fit without a gap: the better of its own first fit, and of the fit with a gap after the gap is closed."""
+        """Start of the fit without a gap: the better of its own first fit and the fit with a gap, its gap set to zero."""
         rigid[fit.others] = best[fit.others]
         closed = best.copy()
         closed[[GAP, HERTZ]] = rigid[[GAP, HERTZ]]

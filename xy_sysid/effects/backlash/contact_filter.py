@@ -51,7 +51,7 @@ def _made(laws: tuple[_Laws, ...]) -> Filter:
 
 
 class _Laws:
-    """An effect, known again by its object."""
+    """Effect as a cache key, compared by identity."""
 
     def __init__(self, effect: Effect) -> None:
         self.effect = effect

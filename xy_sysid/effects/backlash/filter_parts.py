@@ -12,7 +12,7 @@ Covariance = tuple[float, float, float, float, float, float, float, float, float
 
 @law
 def contact(apart: float, rate: float, half: float, k: float, c: float, loss: float, hertz: float) -> tuple[float, float, float]:
-    """Force of the contact, and its derivatives by the distance and by the rate of the distance."""
+    """Contact force, and its derivatives by ``apart`` and by ``rate``."""
     side = 1.0 if apart > 0.0 else -1.0
     depth = side * apart - half
     if depth > 0.0:
@@ -26,7 +26,7 @@ def contact(apart: float, rate: float, half: float, k: float, c: float, loss: fl
 
 @law
 def smooth_sign(v: float, slow: float) -> float:
-    """tanh(v / slow), in a third of its time."""
+    """tanh(v / slow), three times as fast."""
     if abs(v) > 18.0 * slow:
         return 1.0 if v > 0.0 else -1.0
     steep = math.exp(-2.0 * abs(v) / slow)
@@ -35,7 +35,7 @@ def smooth_sign(v: float, slow: float) -> float:
 
 @law
 def _times(row: Four, p: Covariance) -> Four:
-    """A row by the state, times the covariance."""
+    """A row of derivatives by the state, times the covariance."""
     by_x, by_v, by_d, by_w = row
     xx, xv, xd, xw, vv, vd, vw, dd, dw, ww = p
     return (
@@ -53,7 +53,7 @@ def _dot(one: Four, other: Four) -> float:
 
 @law
 def drifted(p: Covariance, h: float) -> Covariance:
-    """The covariance after positions have gone on for ``h`` s at their speeds."""
+    """The covariance after ``h`` s at constant speeds."""
     xx, xv, xd, xw, vv, vd, vw, dd, dw, ww = p
     return (
         xx + h * (2.0 * xv + h * vv),
@@ -71,8 +71,8 @@ def drifted(p: Covariance, h: float) -> Covariance:
 
 @law
 def kicked(p: Covariance, to_v: Four, to_w: Four, shaken: float) -> Covariance:
-    """The covariance after speeds have changed. to_v, to_w: derivatives of the new speed and rate by the state; shaken: variance
-    of either mass's speed that is new, m^2/s^2; what shakes the motor shakes the distance, too."""
+    """The covariance after a change of the speeds. to_v, to_w: derivatives of the new speed and rate by the state; shaken: added variance
+    of the speed of each mass, m^2/s^2; that of the motor also enters the rate of the distance."""
     xx, _, xd, _, _, _, _, dd, _, _ = p
     v, w = _times(to_v, p), _times(to_w, p)
     return (xx, v[0], xd, w[0], _dot(to_v, v) + shaken, v[2], _dot(to_w, v) + shaken, dd, w[2], _dot(to_w, w) + 2.0 * shaken)

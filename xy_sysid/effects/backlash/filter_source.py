@@ -9,9 +9,9 @@ from xy_sysid.effects._contract import Effect, arguments
 from xy_sysid.effects.backlash.filter_template import TEMPLATE
 from xy_sysid.errors import BadInput
 
-NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "hertz", "rub")  # numbers before those of friction
-SLOW = 1e-3  # m/s at which the smoothed friction reaches its level
-FAST = 18.0 * SLOW  # m/s above which nothing of that is left
+NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "hertz", "rub")  # followed by those of friction
+SLOW = 1e-3  # m/s at which the smoothed friction reaches tanh(1) = 76 % of its level
+FAST = 18.0 * SLOW  # m/s above which smoothing has no effect
 NUDGE = 1e-7  # m/s, for the derivative of a law by speed
 
 
@@ -22,7 +22,7 @@ def text(name: str, laws: Sequence[Effect]) -> str:
     q: numbers by ``NAMES``, then the parameters of each law; fs: Hz; noise: variance of the encoder, m^2; drift: of the speeds,
     m^2/s^3; cuts: sub-steps of each of a sample's two pieces; out: (n,) receives measured minus predicted position, m.
 
-    slopes: (n, columns) receives the derivatives of ``out`` by each number of ``q``, then by what is beside; (0, 0) to do without.
+    slopes: (n, columns) receives the derivatives of ``out`` by each number of ``q``, then by those of companions; (0, 0) for none.
     moved_u, moved_y, moved_f: derivatives of u, y, against by some numbers, (b, n), (b, n + 1), (b, 2, n), whose places in the
     columns are column (b,); nudge: (numbers of the laws,) steps for their derivatives.
     Raises BadInput for laws that cannot act together.
@@ -55,7 +55,7 @@ BRISTLED = [
 
 
 def _dry(laws: Sequence[Effect]) -> list[str]:
-    """Level times direction, both smoothed where the motion turns: tanh(v / SLOW), in a third of its time."""
+    """Text of level times direction, smoothed at reversals by tanh(v / SLOW)."""
     words = {word for effect in laws for word in arguments(effect.functions["level"])}
     lines = [
         f"steep = math.exp(-2.0 * abs(v) / {SLOW!r}) if abs(v) < {FAST!r} else 0.0",
@@ -75,7 +75,7 @@ def _dry(laws: Sequence[Effect]) -> list[str]:
 
 
 def _bristle(laws: Sequence[Effect], bristles: Sequence[Effect], function: str) -> str:
-    """A law of bristles; the deflection stays as it is, and there is no force, if there are none."""
+    """Text of a law of bristles; without bristles, constant deflection and no force."""
     words = {"v": "v", "h": "h", "level": "level_of(q, v, math.copysign(1.0, v))"}
     return "".join(_call(laws, effect, function, words) for effect in bristles) or ("z" if function == "bend" else "0.0")
 

@@ -1,17 +1,17 @@
-"""The frame of the filter across a gap, into which ``filter_source`` writes the laws of dry friction.
+"""Template of the filter across a gap, into which ``filter_source`` writes the laws of dry friction.
 
-Two masses that touch across a gap, followed sample by sample: an extended Kalman filter on the motor's position. State: motor
-position (x) and speed (v), motor minus table (d), its rate (w). Flanks push as k depth (1 + loss speed) + c speed and never
-pull (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8); k is constant, or grows with the root of the depth (Hertz), or between.
-The motor rubs by the laws of dry friction given, the table by Coulomb's; the deflection of bristles follows the motor's position
+Two masses with contact across a gap: an extended Kalman filter on the motor's position. State: motor
+position (x) and speed (v), motor minus table (d), its rate (w). The contact force is k depth (1 + loss speed) + c speed and never
+pulls (Hunt & Crossley, J. Appl. Mech. 42, 1975, eq. 8); k is constant, or grows with the root of the depth (Hertz), or a mixture.
+The given laws of dry friction act on the motor, Coulomb friction on the table; the deflection of bristles follows the motor's position
 and is corrected with it (the filter: Jazwinski, Stochastic Processes and Filtering Theory, 1970, sec. 8.3).
 
 Each sub-step of a sample's two pieces of constant voltage is half a drift, a kick and half a drift (leapfrog; Hairer, Lubich &
-Wanner, Acta Numerica 12, 2003), the kick linearly implicit in the speeds: stable while the contact turns less than 2 rad in it,
-whatever damps or rubs. The covariance goes the same way.
+Wanner, Acta Numerica 12, 2003), the kick linearly implicit in the speeds: stable while the phase of the contact advances by less than
+2 rad, with any damping and friction. The covariance takes the same steps.
 
-Derivatives come from the same recursion, differentiated with the filter's gain held: what a parameter changes in the covariance
-is left out. (Near the optimum their angle to differences of the filter is below 0.1; the covariance's own would cost some ten
+Derivatives come from the same recursion, differentiated at constant filter gain: changes of the covariance by a parameter
+are neglected. (Near the optimum their angle to finite differences is below 0.1; derivatives of the covariance would cost about ten
 times as much.)
 """
 

@@ -1,4 +1,4 @@
-"""Innovations of the filter across a gap as a function of numbers that a solver can move, with their derivatives."""
+"""Innovations of the filter across a gap as a function of fitted numbers, with their derivatives."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ from xy_sysid.effects.backlash.contact_filter import filter_with
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.samples.block import FloatArray
 
-STIFF = 2.0 * np.pi * 90.0  # rad/s of the contact at least: flanks of steel; a softer one is a loosely held mass, not play in the drive
-DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): the filter forgives this much acceleration
-SANE = 0.5  # rad/s of the pole over the sampling rate, Hz, to begin with: a base that was led astray would make the filter unstable
-SETTLED = 0.5  # s until the filter is judged
+STIFF = 2.0 * np.pi * 90.0  # rad/s; half of it is the lower bound of the contact: a softer one is a loosely held mass, not steel flanks
+DRIFT = 0.3  # process noise per rms speed, 1/sqrt(s): acceleration that the model may miss
+SANE = 0.5  # largest start value of the pole, rad/s, over the sampling rate, Hz: a wrong base would make the filter unstable
+SETTLED = 0.5  # s of settling, whose innovations do not count
 STEP = 1e-3  # of a number's unit, for derivatives by the companions' parameters
 WORST = 1e6  # innovation over the noise at which it is cut off
 CLOSED = 1e-10  # m: no gap
-TAILS = 3.0  # innovations over their usual size from which they count less (Cauchy): a filter that has lost the gap for a moment
-NORMAL = 1.4826  # standard deviation over the median of what is normally distributed
-MOST = 40  # sub-steps of a sample
-PRESSED = 0.3  # speed of the flanks as they meet, over the usual speed
+TAILS = 3.0  # innovation over scale from which it counts less (Cauchy loss): the filter may briefly lose the state of the gap
+NORMAL = 1.4826  # standard deviation over median magnitude of a normal distribution
+MOST = 40  # largest number of sub-steps in a sample
+PRESSED = 0.3  # typical impact speed of the flanks over ``SPEED``
 LOG = (False, False, True, True, False, True, False, False, False, False, False)  # by NAMES
 GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """How the filter is run.
+    """Settings of a filter run.
 
-    samples: how many, from the first; process_noise_factor, encoder_noise_factor: factors on the noise that the filter assumes
+    samples: number of samples from the first; process_noise_factor, encoder_noise_factor: factors on the noise that the filter assumes
     sub_steps: least number in a sample; turn: largest phase of the closed contact in a sub-step, rad
     """
 
@@ -46,12 +46,12 @@ class View:
     turn: float = 0.35
 
     def within(self, samples: int) -> View:
-        """The same of so many samples at most."""
+        """The same settings with at most this number of samples."""
         return replace(self, samples=min(self.samples, samples))
 
 
 class Innovations:
-    """Over the noise, for coordinates: numbers, or their logarithms, in units.
+    """Innovations over the encoder noise, as a function of coordinates: scaled numbers, or scaled logarithms of them.
 
     The numbers are those of the base and the contact by ``NAMES``, the parameters of each law of dry friction, and those of the companions.
     """
@@ -60,7 +60,7 @@ class Innovations:
         self, sampling_rate: float, base: tuple[float, float, float], noise: float, companions: Companions, laws: tuple[Effect, ...]
     ) -> None:
         self.fs, self.noise, self.companions, self.laws = sampling_rate, noise, companions, laws
-        self._ran: list[None] = []  # one for each run of the filter, whichever thread it is in
+        self._ran: list[None] = []  # one item for each run of the filter, from any thread
         self.filter = filter_with(laws)
         rows = [row for effect in laws for row in _rows_of(effect)]
         self.friction = slice(len(NAMES), len(NAMES) + len(rows))
@@ -77,20 +77,20 @@ class Innovations:
         self.influential = np.arange(3)  # numbers of the base on which the companions depend
 
     def with_soft_contact(self, rate: float) -> Innovations:
-        """The same without a gap, and with a contact that may be as soft as ``rate``, rad/s; ``runs`` counts both."""
+        """A copy that allows a gap of 0 and a contact as soft as ``rate``, rad/s; ``runs`` counts both."""
         other = copy(self)
         other.low = self.low.copy()
         other.low[[RATE, GAP]] = np.log((rate, CLOSED)) / self.unit[[RATE, GAP]]
         return other
 
     def start(self, base: tuple[float, float, float], values: Sequence[float], friction: Sequence[float]) -> FloatArray:
-        """Coordinates."""
+        """Coordinates of start values."""
         gain, delay, pole = base
         return self.inner(np.array([gain, delay, min(pole, SANE * self.fs), *values, *friction, *self.companions.start]))
 
     @property
     def runs(self) -> int:
-        """How often the filter ran."""
+        """Number of filter runs."""
         return len(self._ran)
 
     def inner(self, numbers: FloatArray) -> FloatArray:
@@ -103,25 +103,25 @@ class Innovations:
         return np.asarray(np.where(self.log, np.exp(np.where(self.log, kept, 0.0)), kept))
 
     def innovations(self, inner: FloatArray, view: View) -> FloatArray:
-        """(samples,) innovations over the noise."""
+        """(samples,) innovations over the encoder noise."""
         return self.run(self.outer(inner), view, False)[0]
 
     def rms(self, inner: FloatArray, view: View) -> float:
-        """rms of the innovations over the noise."""
+        """rms of the innovations over the encoder noise."""
         return float(np.sqrt(np.mean(self.innovations(inner, view) ** 2)))
 
     def scale(self, errors: FloatArray) -> float:
-        """Their usual size, over the noise, whatever their tails are."""
+        """Robust scale of the innovations over the encoder noise: 1.4826 times their median magnitude."""
         return NORMAL * float(np.median(np.abs(errors[self._skipped(errors.size) :])))
 
     def cost(self, errors: FloatArray, scale: float) -> float:
-        """Mean of ln(1 + (error / 3 scale)^2): what a fit makes least."""
+        """Mean of ln(1 + (error / (3 scale))^2), which a fit minimises."""
         return float(np.mean(np.log1p((errors[self._skipped(errors.size) :] / (TAILS * scale)) ** 2)))
 
     def solved(self, start: FloatArray, free: NDArray[np.int64], view: View, most: int, enough: float, scale: float | None = None) -> FloatArray:
-        """Coordinates that make ``cost`` least, from a start, of which some are free.
+        """Coordinates that minimise ``cost``, from ``start``; only those with an index in ``free`` change.
 
-        most: steps; enough: relative fall of the cost below which it ends; scale: that of the start if it is not given
+        most: largest number of steps; enough: relative fall of the cost at which it ends; scale: by default that of the start
         """
         whole, skip = np.clip(start, self.low, self.high), self._skipped(view.samples)
         inside = np.clip(start, self.low + 1e-6, self.high - 1e-6)[free]
@@ -153,7 +153,7 @@ class Innovations:
         return whole
 
     def spread(self, inner: FloatArray, view: View) -> FloatArray:
-        """Standard errors of the numbers, from the innovations' slopes."""
+        """Standard errors of the numbers, from the derivatives of the innovations."""
         errors, slopes = self.run(self.outer(inner), view, True)
         skip = self._skipped(errors.size)
         normal = slopes[skip:].T @ slopes[skip:]
@@ -166,7 +166,7 @@ class Innovations:
         return min(int(SETTLED * self.fs), samples // 8)
 
     def run(self, numbers: FloatArray, view: View, sloped: bool) -> tuple[FloatArray, FloatArray]:
-        """(n,) innovations over the noise, and (n, coordinates) their derivatives, or (0, 0)."""
+        """(n,) innovations over the encoder noise, and (n, coordinates) their derivatives, or (0, 0) unless ``sloped``."""
         self._ran.append(None)
         n = view.samples
         voltage, position, against, through = self._undone(numbers, n)
@@ -199,14 +199,14 @@ class Innovations:
         out = np.where(bad, np.copysign(WORST * noise, np.nan_to_num(out, nan=1.0)), out) / noise
         if sloped:
             slopes[bad] = 0.0
-            with np.errstate(over="ignore", invalid="ignore"):  # a filter that runs away
+            with np.errstate(over="ignore", invalid="ignore"):  # a filter that diverges
                 slopes *= self.unit * np.where(self.log, numbers, 1.0) / noise
             slopes[:, column] += np.outer(out, passing / through) * (self.unit * np.where(self.log, numbers, 1.0))[column]
             slopes = np.clip(np.nan_to_num(slopes, nan=0.0), -WORST, WORST)
         return out, slopes
 
     def _sub_steps(self, numbers: FloatArray, turn: float) -> int:
-        """Sub-steps of a sample with which the closed contact, as stiff as it usually is, turns so far in each, rad."""
+        """Sub-steps of a sample with which the phase of the closed contact, at typical stiffness, advances by at most ``turn`` rad."""
         depth = PRESSED * SPEED / numbers[RATE]
         stiffer = 1.0 + numbers[HERTZ] * (1.5 * np.sqrt(2.0 * depth / numbers[GAP]) - 1.0)
         return min(int(np.ceil(numbers[RATE] * np.sqrt(max(stiffer, 0.0)) / self.fs / turn)), MOST)
@@ -215,8 +215,8 @@ class Innovations:
         return self.companions.undo(np.concatenate((numbers[:3], numbers[self.others])), n)
 
     def _derivatives(self, numbers: FloatArray, n: int) -> tuple[NDArray[np.int64], tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
-        """Indices of the numbers that matter, the derivatives of voltage, position and forces by them, and that of the part of a sudden change
-        that the encoder shows at once."""
+        """Indices of the influential numbers, the derivatives of voltage, position and forces by them, and those of the fraction of a sudden
+        change that the encoder shows at once."""
         here = self._undone(numbers, n)
         column = np.array([*self.influential, *range(self.others.start, self.others.stop)])
         steps = STEP * self.unit[column] * np.where(self.log[column], numbers[column], 1.0)
@@ -241,7 +241,7 @@ class _Row:
 
 
 def _rows_of(effect: Effect) -> list[_Row]:
-    """How the solver moves the parameters of a law: the first, its size, as it is, that it can vanish."""
+    """Solver settings of a law's parameters; the first, its size, is not fitted as a logarithm, so that it can become 0."""
     return [_row(item, place == 0) for place, item in enumerate(effect.parameters)]
 
 

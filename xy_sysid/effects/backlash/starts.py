@@ -1,7 +1,7 @@
 """Start values for a fit of the contact: the best of a grid, then of a second grid around the first result.
 
-The innovations of a gap have many valleys, and those of a stiff contact are narrow. A filter that is told of much process noise
-forgets within a few milliseconds, so that its valleys are wide; a thousand runs over two seconds take less than a second.
+The cost of a gap has many local minima, and those of a stiff contact are narrow. A filter that assumes large process noise
+forgets within a few milliseconds, so its minima are wide; a thousand runs over two seconds take less than a second.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from xy_sysid.samples.block import FloatArray
 
 FIRST = View(samples=4000, process_noise_factor=5.0, sub_steps=4, turn=0.7)
 SECOND = View(samples=8000, process_noise_factor=1.2, sub_steps=4, turn=0.35)
-GAPS = (10.0, 0.5, 2.0)  # from so many encoder noises up to so much of the way between two reversals, each so much wider
-WIDEST = 12  # gaps at most
+GAPS = (10.0, 0.5, 2.0)  # smallest gap in encoder noises, largest relative to the distance between two reversals, ratio of neighbours
+WIDEST = 12  # largest number of gaps
 SHARES = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 RATES = tuple(2.0 * np.pi * hertz for hertz in (250.0, 500.0, 1000.0, 2000.0))
 DAMPINGS = (0.05, 0.3)
 REST = (0.0, 0.1, 0.3, 0.0)  # loss, guide, hertz, rub
-AROUND = ((0.75, 0.87, 1.0, 1.15, 1.32, 1.6), (0.7, 1.0, 1.6, 2.5), (0.0, 1.0))  # gap and rate over what was found; hertz
-APART = {"gap": 0.6, "share": 0.15, "rate": 0.8}  # starts that differ by less, in logarithms but for the share, find the same
+AROUND = ((0.75, 0.87, 1.0, 1.15, 1.32, 1.6), (0.7, 1.0, 1.6, 2.5), (0.0, 1.0))  # gap and rate relative to the first result; hertz
+APART = {"gap": 0.6, "share": 0.15, "rate": 0.8}  # start values that differ by less (logarithms, except share) lead to the same result
 NEAR = {"gap": 0.2, "rate": 0.6, "hertz": 0.7}
 BEST = (5, 4)  # start values that are fitted, of the first and of the second grid
 ROUNDS = ((6, 2), (20, 1))  # solver steps of each start value, and how many start values are kept
@@ -49,7 +49,7 @@ def best_of_grids(fit: Innovations, task: OneStepTask) -> FloatArray:
 
 
 def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[str, float], most: int) -> list[FloatArray]:
-    """Those that cost least, each unlike the others, best first."""
+    """Start values with the least cost, best first; of similar ones only the best."""
     errors = on_all_cores(lambda start: fit.innovations(start, view), starts)
     scale = min(fit.scale(error) for error in errors)
     costs = [fit.cost(error, scale) for error in errors]
@@ -65,7 +65,7 @@ def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[st
 
 
 def _best_after_rounds(fit: Innovations, starts: list[FloatArray], view: View) -> FloatArray:
-    """The best of some start values after a few solver steps; in each round fewer are kept and get more steps."""
+    """The best start value after a few solver steps; each round keeps fewer, with more steps."""
     scale = min(fit.scale(fit.innovations(start, view)) for start in starts)
     every = np.arange(starts[0].size)
     for steps, left in ROUNDS:
@@ -75,7 +75,7 @@ def _best_after_rounds(fit: Innovations, starts: list[FloatArray], view: View) -
 
 
 def _gaps(noise: float, swing: float) -> list[float]:
-    """Widths to begin with, m."""
+    """Gaps of the first grid, m."""
     low, high, wider = GAPS[0] * noise, max(GAPS[1] * swing, 4.0 * GAPS[0] * noise), GAPS[2]
     count = min(int(np.ceil(np.log(high / low) / np.log(wider))) + 1, WIDEST)
     return [float(gap) for gap in np.geomspace(low, high, count)]

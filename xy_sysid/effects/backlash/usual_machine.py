@@ -14,7 +14,7 @@ CONTACT = ("m", "", "rad/s", "", "s/m", "", "", "V")  # gap, share, rate, dampin
 
 
 def to_usual(task: OneStepTask) -> OneStepTask:
-    """The same task there."""
+    """The task on the reference machine."""
     similar, bar = task.companions.similar, task.limits.bar
     return replace(
         task,
@@ -42,7 +42,7 @@ def usual(companions: Companions) -> Companions:
 
 
 def from_usual(found: FilterFit, similar: Similarity, back: bool = False) -> FilterFit:
-    """A result there as one here; back: one here as it would be there."""
+    """A result of the reference machine scaled to this one; back: the inverse."""
     length = 1.0 / similar.length if back else similar.length
     return replace(
         found,
