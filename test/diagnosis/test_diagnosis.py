@@ -438,3 +438,12 @@ def test_where_every_stretch_is_too_short_backlash_is_not_tried_and_leaves_doubt
     found = of_run.diagnose(with_gaps("backlash", 150, 10))
     assert found.untried == ("backlash",) and found.effects and found.confidence <= 0.5
     assert "Not tried: backlash, which needs a longer stretch without a gap (the longest is 0.075 s)." in found.sentence
+
+
+@pytest.mark.parametrize("effect", ["thermal_viscosity", "coulomb_friction+cogging"])
+def test_refine_by_itself_takes_the_steps_of_diagnose(effect: str) -> None:
+    """Both need the same size of an effect: for a law outside the library neither adds one that merely resembles it."""
+    run = recorded(effect, seconds=10.0)
+    steps = [rung.values for rung in of_run.refine(run)]
+    assert steps == [rung.values for rung in of_run.diagnose(run)]
+    assert len(steps) == (1 if effect == "thermal_viscosity" else 3)
