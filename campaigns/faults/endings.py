@@ -17,8 +17,9 @@ from campaigns.faults.damage import truth
 from xy_sysid.imports import load, save
 
 WORDS = (
-    "A signal at a random moment from the first instruction to the last: exit code 130 after Ctrl-C and 143 after SIGTERM (or the answer, if it "
-    "came first), no traceback, and the folder contains either the old content or the complete new file. Longest: from the signal to the end."
+    "A signal at a random moment from the first instruction to the last: exit code 130 after Ctrl-C and 143 after SIGTERM, no traceback, and the "
+    "folder contains either the old content or the complete new file. Where the answer came first, the next signal comes in half the time. "
+    "Longest: from the signal to the end."
 )
 RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")
 COMMANDS: dict[str, tuple[tuple[str, ...], float]] = {
@@ -37,6 +38,7 @@ COMMANDS: dict[str, tuple[tuple[str, ...], float]] = {
     "record": (("record", "OUT"), 4.0),
     "run": (("run", "--params", "demo.yaml"), 5.0),
 }
+EARLIER = 6  # signals, each after half the time of the one before, until one comes before the answer
 SLOWEST = 20.0  # s, limit from the signal to the end
 
 
@@ -53,18 +55,23 @@ def ended(name: str) -> Callable[[int, Path], Iterator[Found]]:
         save(truth(16_000), folder / "bag")
         for number in range(count):
             random = np.random.default_rng((81, number))
-            out = folder / f"out{number}"
-            out.mkdir()
-            places = {"BAG": str(folder / "bag")}
-            given = [str(out / "made") + word[3:] if word.startswith("OUT") else places.get(word, word) for word in words]
-            yield _try(
-                [sys.executable, "-m", "xy_sysid", *given], out, (signal.SIGINT, signal.SIGTERM)[number % 2], float(random.uniform(0.0, seconds))
-            )
+            after = float(random.uniform(0.0, seconds))
+            found = None
+            for again in range(EARLIER):
+                out = folder / f"out{number}_{again}"
+                out.mkdir()
+                places = {"BAG": str(folder / "bag")}
+                given = [str(out / "made") + word[3:] if word.startswith("OUT") else places.get(word, word) for word in words]
+                found = _try([sys.executable, "-m", "xy_sysid", *given], out, (signal.SIGINT, signal.SIGTERM)[number % 2], after / 2**again)
+                if found is not None:
+                    break
+            yield found or Found("not told", note=f"{name}: each of {EARLIER} signals came after its end")
 
     return tries
 
 
-def _try(command: list[str], out: Path, number: signal.Signals, after: float) -> Found:
+def _try(command: list[str], out: Path, number: signal.Signals, after: float) -> Found | None:
+    """The outcome of one signal; None if the command had given its answer before."""
     surroundings = environment(ROS_DOMAIN_ID=str(os.getpid() % 90 + 10), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
     with (out.parent / "said").open("wb") as err:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=err, env=surroundings, cwd=out.parent)
@@ -88,9 +95,7 @@ def _try(command: list[str], out: Path, number: signal.Signals, after: float) ->
     if code in (asked, -number):
         kept = command[3] == "record"  # its recording is kept on purpose
         return Found("full", seconds) if not left or (kept and left == ["made"]) else Found("stump", note=f"{what}: {left}")
-    if code in (0, 1):
-        return Found("full", seconds)
-    return Found("not told", note=what)
+    return None if code in (0, 1) else Found("not told", note=what)
 
 
 def killed_recorder(tries: int, folder: Path) -> Iterator[Found]:
