@@ -50,6 +50,13 @@ def test_a_wrong_type_anywhere_is_one_line_that_says_the_right_call(name: str, d
     assert "\n" not in str(told.value)
 
 
+@pytest.mark.parametrize("paths", [np.arange(4.0), np.array(1.0), {1, 2}, {3: "x.csv"}])
+def test_paths_that_are_none_are_refused_in_one_line(paths: Any) -> None:
+    """An array, a set or a dictionary of numbers instead of recordings."""
+    with pytest.raises(xy.XySysidError, match="paths of xy.fleet"):
+        xy.fleet(paths)
+
+
 def test_a_run_a_recording_or_a_file_is_fitted_as_its_frequency_response_is(run: xy.Run, model: xy.LinearModel, tmp_path: Path) -> None:
     """A clear intention is accepted, with the same numbers."""
     columns = np.column_stack((np.arange(run.voltage.size) / run.sampling_rate, run.voltage, run.position))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections.abc
 import types
+from itertools import islice
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin
@@ -64,6 +65,10 @@ def in_words(wanted: Any) -> str:
     return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
 
 
-def _items(value: object) -> tuple[object, ...]:
-    """The first items of what can be gone through more than once."""
-    return tuple(value[:3]) if isinstance(value, list | tuple) else ()
+def _items(value: Any) -> tuple[object, ...]:
+    """The first items of what can be gone through more than once; of an array without a dimension the array, which is no list."""
+    try:
+        again = iter(value)
+    except TypeError:
+        return (value,)
+    return () if again is value else tuple(islice(again, 3))
