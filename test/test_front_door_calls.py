@@ -53,7 +53,7 @@ def test_a_wrong_type_anywhere_is_one_line_that_says_the_right_call(name: str, d
 @pytest.mark.parametrize("paths", [np.arange(4.0), np.array(1.0), {1, 2}, {3: "x.csv"}])
 def test_paths_that_are_none_are_refused_in_one_line(paths: Any) -> None:
     """An array, a set or a dictionary of numbers instead of recordings."""
-    with pytest.raises(xy.XySysidError, match="paths of xy.fleet"):
+    with pytest.raises(xy.XySysidError, match=r"paths of xy\.fleet"):
         xy.fleet(paths)
 
 
