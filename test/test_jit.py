@@ -1,4 +1,4 @@
-"""Machine code: compiled once on a computer, and not counted in the budget of a search."""
+"""Compiling to machine code happens once on each computer. The budget of a search does not count the time for it."""
 
 from __future__ import annotations
 

@@ -164,7 +164,7 @@ class Case:
 
 @lru_cache(maxsize=64)
 def _dirt(case: Case) -> Dirt:
-    """The dirt, scaled on the axis without the truth, because with a gap any change of the motion grows to full size. That axis is smooth."""
+    """The dirt, scaled on the axis without its true effect: across a gap, any small change of the motion would grow to full size."""
     spec = case.exact().with_parts(dict.fromkeys(case.parts, False)).spec
     machine = Machine(replace(spec, inner_rate=SMOOTH * case.rate))
     words = [int.from_bytes(text.encode(), "big") for text in (case.group, *case.truth)]

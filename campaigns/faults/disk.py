@@ -73,7 +73,7 @@ def on_a_file(name: str) -> Callable[[int, Path], Iterator[Found]]:
         rigid(folder / "rec.npz")
         out = folder / "out" / "made"
         out.parent.mkdir()
-        said = command(*_words(COMMANDS[name], folder, out))  # once with enough room, so that nothing is compiled on the full disk
+        said = command(*_words(COMMANDS[name], folder, out))  # once with enough disk space, so that all code is compiled before the disk is full
         assert said.code == 0, said.err
         most = out.stat().st_size
         for number in range(count):

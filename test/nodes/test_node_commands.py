@@ -216,7 +216,7 @@ def test_blocks_are_not_sent_where_a_controller_listens(world: World) -> None:
     assert world.transition("excitation", "configure")
     assert not world.transition("excitation", "activate")
     assert "would go to" in drive.output() and "output to commands" in drive.output()
-    drive.process.terminate()  # a killed one would look like another excitation for 20 s
+    drive.process.terminate()  # after a kill, ROS would report it as a second running excitation for 20 s
     assert drive.wait() == 0
     told = world.start(EXCITATION, {"renamed": True, "patience": 0.5}, arguments=remap)
     assert world.until(lambda: "unconfigured" in told.output())

@@ -13,7 +13,7 @@ from xy_sysid.errors import BadRecording
 LONGEST = 1 << 20  # bytes of a text by people or the commands: a model, parameters, a run file
 WORDS = 20_000  # parts of such a YAML document; repeated parts (aliases) count each time
 DEEPEST = 30  # levels of a YAML document
-PARSER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the compiled one if available
+PARSER = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the parser in C, if it is available
 
 
 def regular_file(path: Path) -> None:

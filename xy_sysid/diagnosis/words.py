@@ -80,7 +80,12 @@ def of_one_stretch(found: Answer, seconds: float) -> str:
     needs = one_step_effect(found.final.model)
     if found.stretch is None or needs is None:
         return ""
-    return f" This is about the longest stretch alone, {seconds:.3g} s, as {needs.name} needs one without a gap."
+    return f" {about_longest(needs.name, seconds)}"
+
+
+def about_longest(name: str, seconds: float) -> str:
+    """Says that only the longest stretch, s, is used, because an effect needs one stretch without a gap."""
+    return f"This is about the longest stretch alone, {seconds:.3g} s, as {name} needs one without a gap."
 
 
 def experiment(name: str, library: Library) -> str:

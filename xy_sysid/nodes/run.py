@@ -35,7 +35,7 @@ class Runnable(Protocol):
         ...
 
     def last_words(self) -> None:
-        """Called once, also after errors, while publishers still work."""
+        """Called once when the node ends, also after an error. Publishers still work at this time."""
         ...
 
     def destroy_node(self) -> None:

@@ -19,6 +19,7 @@ from xy_sysid.diagnosis.diagnose import not_enough
 from xy_sysid.diagnosis.of_run import Data, diagnose, runs_together
 from xy_sysid.diagnosis.refine import Effort, never, refine, settle
 from xy_sysid.diagnosis.rungs import with_one_more
+from xy_sysid.diagnosis.words import about_longest
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import longest
 from xy_sysid.greybox.free_run import EPSILON, AxisData, GreyboxFit, fit, fit_base, prepare_all
@@ -96,7 +97,7 @@ def added(story: Story, run: Data, name: str, library: Library = STANDARD) -> St
     data = _data(story, run)
     if library[name].one_step is not None and len(data.starts) > 1:
         alone = added(_narrowed(story, run, library, longest(data)), run, name, library)
-        return replace(alone, note=f"This is about the longest stretch alone, {alone.seconds:.3g} s, as {name} needs one without a gap.")
+        return replace(alone, note=about_longest(name, alone.seconds))
     planned = _planned(story)
     if planned is not None and planned.added == name:
         return _shown(story, data, planned, _fit_of(story, data, library, planned))
