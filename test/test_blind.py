@@ -160,9 +160,9 @@ def test_it_is_known_how_much_of_the_motion_is_due_to_what() -> None:
     assert replace(hit, change={"coulomb_friction": 1e-5}).hidden
 
 
-def verdict(*effects: str, confidence: float = 1.0, kind: str = "missing_effect") -> SimpleNamespace:
+def verdict(*effects: str, confidence: float = 1.0, kind: str = "missing_effect", could_hide: float = 0.0) -> SimpleNamespace:
     """A diagnosis without its evidence."""
-    return SimpleNamespace(verdict=kind, effects=effects, confidence=confidence, rungs=())
+    return SimpleNamespace(verdict=kind, effects=effects, confidence=confidence, rungs=(), could_hide=could_hide)
 
 
 @pytest.mark.parametrize(
@@ -205,6 +205,32 @@ def test_what_is_really_there_beside_the_truth_is_no_phantom(monkeypatch: pytest
     assert run(case).phantoms == ()
     monkeypatch.setattr(judge, "diagnose", lambda *_, **__: verdict("cogging", "base_resonance"))
     assert run(Case("test", ("cogging",), 1, "development", seconds=5.0, dirt=0.03)).phantoms == ("base_resonance",)
+
+
+@pytest.mark.parametrize(
+    ("truth", "said", "changes", "could_hide", "right"),
+    [
+        (("hardening_stiffness",), (), 0.0005, 0.001, True),
+        (("hardening_stiffness",), (), 0.0005, 0.0004, False),  # the answer does not say that so much could be hidden
+        (("hardening_stiffness",), (), 0.002, 0.01, False),  # more than a tenth of the noise
+        (("hardening_stiffness",), ("cogging",), 0.0005, 0.001, False),
+        (("hardening_stiffness",), ("hardening_stiffness",), 0.0005, 0.001, True),
+        (("hardening_stiffness", "cogging"), ("cogging",), 0.0005, 0.001, True),
+        (("hardening_stiffness", "cogging"), (), 0.0005, 0.001, False),
+        (("hardening_stiffness", "cogging"), ("cogging", "backlash"), 0.0005, 0.001, False),
+    ],
+)
+def test_an_effect_that_cannot_be_seen_need_not_be_named_if_the_answer_says_so(
+    truth: tuple[str, ...], said: tuple[str, ...], changes: float, could_hide: float, right: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Below a tenth of noise and dirt, and below what the answer says could be hidden; all others must be named, and nothing else."""
+    seen = Seen(change=dict.fromkeys(truth, 0.3) | {"hardening_stiffness": changes}, noise=0.01, dirt=0.0, kinds=())
+    monkeypatch.setattr(judge, "recorded", lambda *_: Recorded(2000.0, np.zeros(0), np.zeros(0), seen))
+    kind = "missing_effect" if said else "nothing_missing"
+    monkeypatch.setattr(judge, "diagnose", lambda *_, **__: verdict(*said, kind=kind, could_hide=could_hide))
+    found = run(Case("test", truth, 1, "development", seconds=5.0))
+    assert found.right is right
+    assert hit(found) is right
 
 
 @pytest.mark.parametrize(("kinds", "phantoms"), [(("quadratic_drag", "mains_hum"), ()), (("mains_hum",), ("quadratic_drag",))])
@@ -250,8 +276,8 @@ def test_the_page_tells_hits_misses_and_goals() -> None:
     page = text({"exact": items}, "development", "python -m campaigns.blind", "")
     assert "| coulomb_friction | 1 of 1 |" in page
     assert "| dead_zone | 0 of 1 |" in page
-    assert "| exact: one effect | 1 of 2 (50 %) | >= 149 of 150 | 1 | 1 (50.0 %) | 1 (50.0 %) | 0 |" in page
-    assert "| exact: no effect | 1 of 1 (100 %) | all | 0 | 0 | 0 | 0 |" in page
+    assert "| exact: one effect | 1 of 2 (50 %) | 0 | >= 149 of 150 | 1 | 1 (50.0 %) | 1 (50.0 %) | 0 |" in page
+    assert "| exact: no effect | 1 of 1 (100 %) | 0 | all | 0 | 0 | 0 | 0 |" in page
     assert page.count("standard/dead_zone/1: missing_effect coulomb_friction (confidence 1.00); of the motion: coulomb_friction ") == 2
     assert "not there: coulomb_friction" in page
 

@@ -32,6 +32,7 @@ class Judged:
     first:    the first name is one of the truth's
     wrong:    a name that is not in the truth came first, with confidence
     phantoms: named effects that are not on the axis, at any place and with any confidence
+    unseen:   effects of the truth that change the motion by less than ``FAINT`` of noise and dirt, and by less than the answer says could be hidden
     ratio:    held-out error over that of a fit started at the truth; for backlash innovation over noise; None if not named
     errors:   parameter -> relative error; inside: parameter -> True if the truth is in its 95 % interval
     change, noise, dirt, kinds: see ``recordings.Seen``
@@ -46,6 +47,7 @@ class Judged:
     first: bool
     wrong: bool
     phantoms: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()
     ratio: float | None = None
     errors: dict[str, float] = field(default_factory=dict)
     inside: dict[str, bool] = field(default_factory=dict)
@@ -62,7 +64,7 @@ class Judged:
     @property
     def hidden(self) -> bool:
         """True if an effect of the truth changes the motion too little to be detected in noise and dirt."""
-        return bool(self.change) and min(self.change.values()) < FAINT * math.hypot(self.noise, self.dirt)
+        return any(part < faint(self.noise, self.dirt) for part in self.change.values())
 
 
 def run(case: Case, folder: Path | None = None) -> Judged:
@@ -75,21 +77,29 @@ def run(case: Case, folder: Path | None = None) -> Judged:
     seconds = time.process_time() - begun
     named = names(found)
     one = len(case.truth) == 1 and not case.nuisance
-    if not case.known:
-        right = found.verdict in ("not_in_library", "nothing_missing")
-    elif not case.truth:
-        right = found.verdict == "nothing_missing" or (case.dirt > 0.0 and found.verdict == "not_in_library")
-    elif one:
-        right = laws(named) == laws(case.truth)
-    else:
-        right = laws(case.truth) <= laws(named)
-    first = bool(named) and (named[0] in case.truth or (right and laws(named[:1]) <= laws(case.truth)))
     there = _there(case, machine, seen.kinds)
     phantoms = tuple(name for name in named if not laws((name,)) <= there)
+    unseen = tuple(name for name, part in seen.change.items() if name not in named and part < min(found.could_hide, faint(seen.noise, seen.dirt)))
+    visible = tuple(name for name in case.truth if name not in unseen)
+    if not case.known:
+        right = found.verdict in ("not_in_library", "nothing_missing")
+    elif not visible and not case.nuisance:
+        right = found.verdict == "nothing_missing" or (case.dirt > 0.0 and found.verdict == "not_in_library")
+    elif one:
+        right = laws(named) == laws(visible)
+    else:
+        right = laws(visible) <= laws(named) and not (phantoms and unseen)
+    first = bool(named) and (named[0] in case.truth or (right and laws(named[:1]) <= laws(case.truth)))
     stray = bool(named) and not first and not ((case.nuisance or seen.kinds) and laws(named[:1]) <= there)
-    ratio, errors, inside = _measured(case, machine, recording.rate, u, y, found) if right and one and case.known else (None, {}, {})
+    ratio, errors, inside = _measured(case, machine, recording.rate, u, y, found) if right and visible and one and case.known else (None, {}, {})
     made = outcome(case, found, seconds, right=right, first=first, stray=stray, phantoms=phantoms)
-    return replace(made, ratio=ratio, errors=errors, inside=inside, change=seen.change, noise=seen.noise, dirt=seen.dirt, kinds=seen.kinds)
+    made = replace(made, ratio=ratio, errors=errors, inside=inside, unseen=unseen)
+    return replace(made, change=seen.change, noise=seen.noise, dirt=seen.dirt, kinds=seen.kinds)
+
+
+def faint(noise: float, dirt: float) -> float:
+    """The part of the motion below which a change is not expected to be seen."""
+    return FAINT * math.hypot(noise, dirt)
 
 
 def names(found: Answer) -> tuple[str, ...]:

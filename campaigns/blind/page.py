@@ -63,7 +63,9 @@ def text(results: dict[str, list[Judged]], draws: str, command: str, facts: str)
         f"nothing is missing. For dirt alone and for effects outside the library: no effect is named with confidence {CONFIDENT:g} or more.",
         f"- **Phantom**: an effect that the axis does not have is named with confidence {CONFIDENT:g} or more, alone or together with the true one.",
         f"- **Wrong**: the first name is not one of the true effects, with confidence {CONFIDENT:g} or more.",
-        f"- **Hidden**: the answer is not right, and an effect changes the motion by less than {100 * FAINT:.0f} % of the change by noise and dirt.",
+        f"- **Unseen**: an effect changes the motion by less than {100 * FAINT:.0f} % of the change by noise and dirt, and by less than the answer "
+        "says could be hidden. It need not be named: the answer is right if all other effects are, and nothing that the axis does not have.",
+        "- **Hidden**: such an effect, and the answer is not right, or does not say that so large an effect could be hidden.",
         "- Effects are compared by their laws: asymmetric friction counts as Coulomb friction with a constant load, and every dry friction that "
         "slides contains Coulomb friction.",
         "- Seconds are processor time.",
@@ -90,8 +92,9 @@ def _rows(results: dict[str, list[Judged]]) -> Iterator[tuple[str, str, list[Jud
 
 def _table(results: dict[str, list[Judged]]) -> list[str]:
     rows = [
-        "| set | right | goal | right and named first | phantoms | wrong | hidden | intervals that contain the true value | time: median, worst |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| set | right | of these unseen | goal | right and named first | phantoms | wrong | hidden | intervals that contain the true value "
+        "| time: median, worst |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     every = [item for items in results.values() for item in items]
     for name, goal, items in [*_rows(results), ("**all**", "phantoms and wrong <= 1 %", every)]:
@@ -101,7 +104,8 @@ def _table(results: dict[str, list[Judged]]) -> list[str]:
         inside = [value for item in items for value in item.inside.values()]
         seconds = [item.seconds for item in items]
         rows.append(
-            f"| {name} | {len(right)} of {count} ({100 * len(right) / count:.0f} %) | {goal} | {sum(item.first for item in right)} "
+            f"| {name} | {len(right)} of {count} ({100 * len(right) / count:.0f} %) | {sum(bool(item.unseen) for item in right)} | {goal} "
+            f"| {sum(item.first for item in right)} "
             f"| {_part(sum(item.phantom for item in items), count)} | {_part(sum(item.wrong for item in items), count)} "
             f"| {sum(item.hidden and not hit(item) for item in items)} "
             f"| {f'{100 * float(np.mean(inside)):.0f} % of {len(inside)}' if inside else '-'} | {np.median(seconds):.2f} s, {max(seconds):.1f} s |"
@@ -172,7 +176,7 @@ def hit(item: Judged) -> bool:
     if not item.case.known or (item.case.dirt and not item.case.truth):
         return not (item.verdict == "missing_effect" and item.confidence >= CONFIDENT)
     alone = len(item.case.truth) == 1 and not item.case.nuisance and item.case.group != "standard"
-    return item.first if alone else item.right
+    return item.first or (item.right and bool(item.unseen)) if alone else item.right
 
 
 def _line(item: Judged) -> str:

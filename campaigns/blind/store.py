@@ -23,7 +23,7 @@ def load(path: Path) -> dict[Case | Foreign, Judged]:
             continue
         words, truth = row.pop("case"), tuple(row.pop("truth"))
         case = Foreign(**words) if "loop" in words else Case(**words | {"truth": truth})
-        found[case] = Judged(case, **row | {name: tuple(row[name]) for name in ("effects", "phantoms", "kinds") if name in row})
+        found[case] = Judged(case, **row | {name: tuple(row[name]) for name in ("effects", "phantoms", "unseen", "kinds") if name in row})
     return found
 
 

@@ -22,6 +22,7 @@ def answer_document(found: Answer) -> dict[str, Any]:
         "effects": list(found.effects),
         "confidence": found.confidence,
         "tolerance": found.tolerance,
+        "could_hide": found.could_hide,
         "sentence": found.sentence,
         "error": {
             "unit": found.units.judged,

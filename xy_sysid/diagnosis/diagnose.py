@@ -70,25 +70,23 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     motion = max(data.layout.rms(data.floor.motion), 1e-300)
     left = found.discrepancy / motion
     found, base, names = replace(found, tolerance=left, force=unmodelled_force(data, found.final)), found.base, found.best
-    hidden_part = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion  # in the noise
-    noise = None
+    in_noise = math.sqrt(math.expm1(AT_FLOOR)) * data.layout.rms(data.floor.power) / motion
+    could_hide, noise = max(left, in_noise), None
     if names and (found.explained >= 1.0 - found.explained or found.final.excess < AT_FLOOR):
         verdict: Kind = "missing_effect"
         confidence, experiment = sure, words.experiment(names[0], library)
         sentence = words.missing(data, found, every[len(names) :], with_all)
     elif base.excess < AT_FLOOR or (noise := input_noise(data, base)) is not None:
         verdict, names, experiment = "nothing_missing", (), "None is needed."
-        found, trust = replace(found, explained=0.0, kept_out=None), 1.0 - max(base.excess, 0.0)
-        if noise is not None:
-            trust, hidden_part = 1.0 - found.helps, max(left, hidden_part)
-        confidence = trust * (1.0 - _part_hidden(hidden_part, data.floor.epsilon))
-        sentence = words.nothing_missing(data, base, noise, hidden_part)
+        found, trust = replace(found, explained=0.0, kept_out=None), 1.0 - (max(base.excess, 0.0) if noise is None else found.helps)
+        confidence = trust * (1.0 - _part_hidden(could_hide, data.floor.epsilon))
+        sentence = words.nothing_missing(data, base, noise)
     else:
         verdict, experiment = "not_in_library", _UNKNOWN
-        confidence = (1.0 - found.helps) * (1.0 - _part_hidden(max(left, hidden_part), data.floor.epsilon))
+        confidence = (1.0 - found.helps) * (1.0 - _part_hidden(could_hide, data.floor.epsilon))
         found = replace(found, force=unmodelled_force(data, base))
         sentence = words.not_in_library(data, found)
-    sentence += words.kept_out(found)
+    sentence += words.hidden(could_hide) + words.kept_out(found)
     seconds = max(run.stop - run.start for run in data.runs) / data.sampling_rate
     sentence += words.not_tried(found.untried, seconds) if verdict != "nothing_missing" else ""
     sentence += words.of_one_stretch(found, seconds)
@@ -98,6 +96,7 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     found = replace(
         found,
         verdict=verdict,
+        could_hide=could_hide,
         confidence=float(confidence),
         sentence=sentence,
         candidates=tuple(sorted(found.candidates, key=lambda item: item.name not in names)),

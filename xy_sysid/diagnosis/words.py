@@ -33,14 +33,18 @@ def missing(data: AxisData, found: Answer, unsure: Sequence[str], with_all: floa
     return said
 
 
-def nothing_missing(data: AxisData, base: GreyboxFit, input_noise: float | None, hidden_part: float) -> str:
-    """Nothing is missing. input_noise: rms of white input noise with the same error, None at the floor; hidden_part: part of the motion."""
+def nothing_missing(data: AxisData, base: GreyboxFit, input_noise: float | None) -> str:
+    """Nothing is missing. input_noise: rms of white input noise with the same error, None at the floor."""
     unit = data.units.judged
     why = f"at the noise floor ({moved(base.noise_floor, unit)})"
     if input_noise is not None:
         why = f"the error that white noise of {input_noise:.3g} {data.units.input} rms on the input would cause"
-    said = f"Nothing is missing: the residual error of the rigid model with delay is {moved(base.held_out_error, unit)}, which is {why}."
-    return f"{said} An effect that changes the motion by less than {percent(hidden_part)} could be hidden in it."
+    return f"Nothing is missing: the residual error of the rigid model with delay is {moved(base.held_out_error, unit)}, which is {why}."
+
+
+def hidden(part: float) -> str:
+    """What these data cannot show. part: of the motion."""
+    return f" An effect that changes the motion by less than {percent(part)} could be hidden."
 
 
 def not_in_library(data: AxisData, found: Answer) -> str:
