@@ -172,7 +172,7 @@ class Answer:
     tried_first: a set that was known before and ended the search, as it explains the data down to the noise floor; see ``first_set``
     verdict:  see Kind; confidence: 0..1; sentence: both in words; units: of input and output
     tolerance: part of the motion (rms) that is left unexplained beyond the noise
-    could_hide: an effect that changes less of the motion (rms) than this part may be there unseen, in the noise or in what is left
+    could_hide: an effect that changes less of the motion (rms) than this part may be there unseen, in the noise or in the residual error
     where:    the places where the base fails; look_alikes: of the first effect; runs: that it is about
     force:    that nobody modelled: what the last rung leaves, or the base where no effect is named
     untried:  effects that need one stretch without a gap, where the longest is too short for them
