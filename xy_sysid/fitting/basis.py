@@ -29,7 +29,7 @@ class Basis:
 
     def values(self, x: ComplexArray) -> ComplexArray:
         """(len(x), order + 1) values of every polynomial at x."""
-        return _values(x, self.first, self.recurrence)
+        return values_of(x, self.first, self.recurrence)
 
     def parts(self, x: ComplexArray) -> FloatArray:
         """(2, order + 1, len(x)) real and imaginary parts of the same values."""
@@ -51,12 +51,12 @@ class Basis:
 
 def basis(x: ComplexArray, weight: FloatArray, order: int) -> Basis:
     """Polynomials up to an order, orthonormal under the real scalar product sum weight^2 Re(conj(p) q) over the points x."""
-    first, recurrence = _arnoldi(x, weight, order)
+    first, recurrence = arnoldi(x, weight, order)
     return Basis(first, recurrence)
 
 
 @compiled
-def _arnoldi(x: NDArray[np.complex128], weight: NDArray[np.float64], order: int) -> tuple[float, NDArray[np.float64]]:
+def arnoldi(x: NDArray[np.complex128], weight: NDArray[np.float64], order: int) -> tuple[float, NDArray[np.float64]]:
     size = x.shape[0]
     vectors = np.empty((order + 1, size), dtype=np.complex128)
     recurrence = np.zeros((order + 1, order))
@@ -85,7 +85,7 @@ def _arnoldi(x: NDArray[np.complex128], weight: NDArray[np.float64], order: int)
 
 
 @compiled
-def _values(x: NDArray[np.complex128], first: float, recurrence: NDArray[np.float64]) -> NDArray[np.complex128]:
+def values_of(x: NDArray[np.complex128], first: float, recurrence: NDArray[np.float64]) -> NDArray[np.complex128]:
     order = recurrence.shape[1]
     out = np.empty((x.shape[0], order + 1), dtype=np.complex128)
     for i in range(x.shape[0]):

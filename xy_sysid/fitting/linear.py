@@ -6,25 +6,28 @@ and delay enter as a correction of the data: the difference that they make in th
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from xy_sysid.fitting.basis import basis
+from xy_sysid.fitting.basis import Basis, arnoldi, values_of
 from xy_sysid.fitting.plan import plan_for
 from xy_sysid.fitting.problem import Point, Problem, cost, rational, response
 from xy_sysid.fitting.structure import FitOptions
+from xy_sysid.jit import compiled
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
 SCAN_STEPS = 4  # reweightings at each delay of the scan: enough to rank delays
 MOST_DELAYS = 400  # of one scan; with more, lower lines select a range first
+SMALLEST = 1e-14  # part of the largest diagonal below which a coefficient is not determined
 FOLLOWED = 6  # best delays of the lower lines around which the fine grid is searched
 
 
 def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) -> Point:
     """One linear fit at a delay, weighted by the last denominator; the first one (last=None) is Levy's."""
-    line, structure = task.plan.line, task.structure
     factor = task.plan.line_factor * np.exp(-1j * task.plan.line_omega * delay)
     data = task.frf.response
     weight: ComplexArray = task.weight.astype(np.complex128)
@@ -33,19 +36,83 @@ def linear_step(task: Problem, delay: float, last: Point | None, correct: bool) 
         weight = weight / (down / np.max(np.abs(down)))
         if correct:
             data = data - (response(task, last) - factor * up / down)
-    n_weight, d_weight = weight * factor, weight * data
-    numerator = basis(line, np.abs(n_weight), structure.numerator_order)
-    denominator = basis(line, np.abs(d_weight), structure.free_order)
-    left = numerator.values(line) * n_weight[:, None]
-    right = denominator.values(line) * d_weight[:, None]
-    table = np.concatenate((left, -right[:, :-1], right[:, -1:]), axis=1)
-    upper: FloatArray = np.asarray(np.linalg.qr(np.concatenate((table.real, table.imag)), mode="r"))
-    size = upper.shape[1] - 1
-    if not np.all(np.isfinite(upper)):
-        upper = np.zeros_like(upper)  # not solvable: a point whose cost is infinite or worse than any other
-    solution: FloatArray = np.asarray(np.linalg.lstsq(upper[:size, :size], upper[:size, size], rcond=1e-14)[0], dtype=np.float64)
-    split = structure.numerator_order + 1
-    return Point(numerator=numerator, denominator=denominator, b=solution[:split], a=np.append(solution[split:], 1.0), delay=delay)
+    structure = task.structure
+    return _point(_solved(task.plan.line, weight * factor, weight * data, structure.numerator_order, structure.free_order)[:5], delay)
+
+
+def _point(solved: tuple[float, FloatArray, float, FloatArray, FloatArray], delay: float) -> Point:
+    """A solution as a model; the last coefficient of the denominator is 1."""
+    n_first, n_recurrence, d_first, d_recurrence, solution = solved
+    split = n_recurrence.shape[0]
+    b, a = solution[:split], np.append(solution[split:], 1.0)
+    return Point(numerator=Basis(n_first, n_recurrence), denominator=Basis(d_first, d_recurrence), b=b, a=a, delay=delay)
+
+
+@compiled
+def _solved(
+    line: NDArray[np.complex128], n_weight: NDArray[np.complex128], d_weight: NDArray[np.complex128], n_order: int, d_order: int
+) -> tuple[float, NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]]:
+    """The least-squares solution of n_weight N = d_weight D: both bases (first, recurrence), the coefficients, and N and D on the lines."""
+    lines, split, size = line.shape[0], n_order + 1, n_order + 1 + d_order
+    n_size, d_size = np.empty(lines), np.empty(lines)
+    for i in range(lines):
+        n_size[i], d_size[i] = abs(n_weight[i]), abs(d_weight[i])
+    n_first, n_recurrence = arnoldi(line, n_size, n_order)
+    d_first, d_recurrence = arnoldi(line, d_size, d_order)
+    left, right = values_of(line, n_first, n_recurrence), values_of(line, d_first, d_recurrence)
+    table = np.empty((size + 1, 2 * lines))  # a row for each coefficient, the known side last; real parts, then imaginary ones
+    for k in range(size + 1):
+        for i in range(lines):
+            value = n_weight[i] * left[i, k] if k < split else d_weight[i] * right[i, k - split]
+            if split <= k < size:
+                value = -value
+            table[k, i], table[k, lines + i] = value.real, value.imag
+    solution = _least(table)
+    up, down = np.empty(lines, dtype=np.complex128), np.empty(lines, dtype=np.complex128)
+    for i in range(lines):
+        up[i], down[i] = 0.0, right[i, d_order]
+        for k in range(split):
+            up[i] += left[i, k] * solution[k]
+        for k in range(d_order):
+            down[i] += right[i, k] * solution[split + k]
+    return n_first, n_recurrence, d_first, d_recurrence, solution, up, down
+
+
+@compiled
+def _least(table: NDArray[np.float64]) -> NDArray[np.float64]:
+    """x that minimises |sum_k x_k table[k] - table[-1]|, by Householder reflections in place.
+
+    A coefficient that is not determined is 0; all are 0 if a number is not finite.
+    """
+    size, count = table.shape[0] - 1, table.shape[1]
+    diagonal, solution = np.zeros(size), np.zeros(size)
+    largest = 0.0
+    for j in range(min(size, count)):
+        norm = 0.0
+        for i in range(j, count):
+            norm += table[j, i] * table[j, i]
+        norm = math.sqrt(norm)
+        if not math.isfinite(norm):
+            return solution
+        if norm == 0.0:
+            continue
+        largest = max(largest, norm)
+        diagonal[j] = -norm if table[j, j] > 0.0 else norm
+        table[j, j] -= diagonal[j]
+        for k in range(j + 1, size + 1):
+            along = 0.0
+            for i in range(j, count):
+                along += table[j, i] * table[k, i]
+            along /= diagonal[j] * table[j, j]
+            for i in range(j, count):
+                table[k, i] += along * table[j, i]
+    for j in range(size - 1, -1, -1):
+        if abs(diagonal[j]) > SMALLEST * largest:
+            value = table[size, j]
+            for k in range(j + 1, size):
+                value -= table[k, j] * solution[k]
+            solution[j] = value / diagonal[j]
+    return solution
 
 
 def reweighted(task: Problem, delay: float, steps: int, start: Point | None = None) -> tuple[Point, float, int]:
@@ -93,23 +160,47 @@ def scan(task: Problem, steps: int, options: FitOptions) -> list[tuple[float, fl
 
 def _minima(task: Problem, delays: FloatArray, steps: int) -> list[tuple[float, float, Point]]:
     """(cost, delay, point) at the local minima of the cost over some delays, best first."""
-    found: list[tuple[float, float, Point]] = []
-    for delay in delays:
-        point = linear_step(task, float(delay), None, False)
-        lowest = _simple_cost(task, point)
-        for _ in range(min(steps, SCAN_STEPS) - 1):
-            point = linear_step(task, float(delay), point, False)
-            lowest = min(lowest, _simple_cost(task, point))
-        found.append((lowest if np.isfinite(lowest) else np.inf, float(delay), point))
+    plan, orders = task.plan, (task.structure.numerator_order, task.structure.free_order)
+
+    def at(delay: float) -> tuple[float, float, Point]:
+        factor = plan.line_factor * np.exp(-1j * plan.line_omega * delay)
+        lowest, *solved = _reweighted(plan.line, factor, task.frf.response, task.weight, *orders, min(steps, SCAN_STEPS))
+        return lowest, delay, _point(solved, delay)
+
+    found = [at(float(delay)) for delay in delays]
     costs = [item[0] for item in found]
     padded = [np.inf, *costs, np.inf]
     minima = [i for i in range(len(found)) if padded[i + 1] <= padded[i] and padded[i + 1] <= padded[i + 2]]
     return [found[i] for i in sorted(minima, key=lambda i: costs[i])]
 
 
-def _simple_cost(task: Problem, at: Point) -> float:
-    up, down = rational(task, at)
-    return cost(task, task.plan.line_factor * np.exp(-1j * task.plan.line_omega * at.delay) * up / down)
+@compiled
+def _reweighted(
+    line: NDArray[np.complex128],
+    factor: NDArray[np.complex128],
+    data: NDArray[np.complex128],
+    weight: NDArray[np.float64],
+    n_order: int,
+    d_order: int,
+    steps: int,
+) -> tuple[float, float, NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64]]:
+    """The lowest cost of some linear steps without correction of the data, infinite if none is finite; and the solution of the last step."""
+    lines, lowest = line.shape[0], np.inf
+    n_weight, d_weight = np.empty(lines, dtype=np.complex128), np.empty(lines, dtype=np.complex128)
+    down, largest = np.ones(lines, dtype=np.complex128), 1.0
+    for _ in range(steps):
+        for i in range(lines):
+            now = weight[i] * largest / down[i]
+            n_weight[i], d_weight[i] = now * factor[i], now * data[i]
+        n_first, n_recurrence, d_first, d_recurrence, solution, up, down = _solved(line, n_weight, d_weight, n_order, d_order)
+        total, largest = 0.0, 0.0
+        for i in range(lines):
+            error = weight[i] * (factor[i] * up[i] / down[i] - data[i])
+            total += error.real * error.real + error.imag * error.imag
+            largest = max(largest, abs(down[i]))
+        if 0.5 * total < lowest:
+            lowest = 0.5 * total
+    return lowest, n_first, n_recurrence, d_first, d_recurrence, solution
 
 
 def searched(task: Problem, steps: int, options: FitOptions) -> tuple[Point, float, int]:
