@@ -164,8 +164,8 @@ def _minima(task: Problem, delays: FloatArray, steps: int) -> list[tuple[float, 
 
     def at(delay: float) -> tuple[float, float, Point]:
         factor = plan.line_factor * np.exp(-1j * plan.line_omega * delay)
-        lowest, *solved = _reweighted(plan.line, factor, task.frf.response, task.weight, *orders, min(steps, SCAN_STEPS))
-        return lowest, delay, _point(solved, delay)
+        found = _reweighted(plan.line, factor, task.frf.response, task.weight, *orders, min(steps, SCAN_STEPS))
+        return found[0], delay, _point(found[1:], delay)
 
     found = [at(float(delay)) for delay in delays]
     costs = [item[0] for item in found]
