@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.known_models import axis, known
+from helpers.known_models import DELAY, axis, known
 
+from xy_sysid.control_design.closed_loop import Encoder, follow_path
 from xy_sysid.control_design.feedback import Asked, feedback, within_a_gap
+from xy_sysid.control_design.path import Bounds, s_curve
 from xy_sysid.control_design.sampled import sampled
 from xy_sysid.control_design.state_feedback import StateFeedback, closed_loop, state_feedback
 from xy_sysid.control_design.state_text import source
@@ -83,6 +85,19 @@ def test_c_and_python_run_as_the_design_does(rigid: StateFeedback, tmp_path: Pat
         assert python.input(error, fed) == pytest.approx(written[-1], rel=1e-9, abs=1e-12)
         assert compiled(state, ctypes.c_double(error), ctypes.c_double(fed)) == pytest.approx(written[-1], rel=1e-9, abs=1e-12)
     assert max(written) == 2.0 and min(np.abs(written)) < 2.0
+
+
+def test_a_simulated_path_is_followed_as_the_exported_source_would(rigid: StateFeedback) -> None:
+    """Reading by reading: its errors, passed to the source with the feedforward, give the voltages that were written, at the limit too."""
+    space: dict[str, Any] = {}
+    exec(source(rigid, "axis", "a test", 1.0)[1], space)
+    controller, late = space["Controller"](), axis(delay=DELAY + 1.0 / RATE)
+    path = s_curve([0.0, 0.02, 0.0], Bounds(0.3, 5.0, 500.0), RATE)
+    extra = 0.5 * np.sin(0.02 * np.arange(path.position.size))
+    run = follow_path(late, path, rigid.controller(1.0), extra, Encoder(noise=1e-6, count=0.5e-6))
+    written = [controller.input(error, fed) for error, fed in zip(path.position - run.shown, extra, strict=True)]
+    assert run.voltage == pytest.approx(np.array(written), rel=1e-9, abs=1e-12)
+    assert np.max(np.abs(run.voltage)) == 1.0
 
 
 def test_an_axis_that_coasts_is_held_at_a_bandwidth_of_its_pid() -> None:

@@ -54,9 +54,22 @@ def test_before_and_after_are_told_on_the_machines_own_recording(model: xy.Physi
     for item in used.tracking:
         assert item.whole < item.simple / 3.0 and item.whole < item.feedback / 10.0
         assert item.worst >= item.whole and item.largest <= item.limit == np.max(np.abs(other.voltage))
+        (states,) = item.loops
+        assert states.name == "state feedback" and states.largest <= item.limit
+        assert states.compensated < states.alone / 10.0 and states.compensated <= states.worst < 2.0 * item.worst
     assert used.gains["kS"].low < 0.3 < used.gains["kS"].high
     assert not used.notes
     assert "fitted to this recording" in " ".join(use(model, recorded("coulomb_friction=0.3", 12.0).run("x")).notes)
+
+
+def test_a_filter_in_the_loop_is_tried_along_the_same_path() -> None:
+    """The loop with the notch or low-pass has a higher bandwidth, and a smaller error along the path, alone and with the compensation."""
+    used = use(known("screw_compliance", spread=0.02), rate=2000.0, limit=10.0, travel=(-0.05, 0.05))
+    assert used.filter is not None
+    by_name = {item.name: item for item in used.tracking[0].loops}
+    assert set(by_name) == {f"with the {used.filter.kind}", "state feedback"}
+    better = by_name[f"with the {used.filter.kind}"]
+    assert better.alone < used.tracking[0].feedback and better.compensated < 0.1 * better.alone and better.largest < 10.0
 
 
 def test_a_model_without_intervals_is_used_with_a_warning() -> None:

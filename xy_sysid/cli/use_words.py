@@ -76,17 +76,13 @@ def show(name: str, used: Used) -> None:
             f"  The recorded input below {p.below:.3g} Hz, predicted from the recorded motion, is off by {off[0]} with kV and kA alone, "
             f"{off[1]} with kS, {off[2]} with the whole feedforward{tabled}."
         )
-    errors = [
-        (
-            item.path,
-            *(bare(value, units.output) for value in (item.feedback, item.simple, item.compensated, item.worst)),
-            f"{item.largest:.3g}",
-        )
-        for item in used.tracking
-    ]
-    if errors:
-        columns = ("path", "feedback", "+ kS kV kA", "compensated", "worst", f"largest {units.input}")
-        table(f"axis {name}: simulated tracking error, rms, {motion(units.output)[1]}", columns, errors)
+    for way in used.tracking:
+        errors = [("PID", *(bare(value, units.output) for value in (way.feedback, way.simple, way.compensated, way.worst)), f"{way.largest:.3g}")]
+        for other in way.loops:
+            alone, *both = (bare(value, units.output) for value in (other.alone, other.compensated, other.worst))
+            errors.append((other.name, alone, "", *both, f"{other.largest:.3g}"))
+        title = f"axis {name}, {way.path}: simulated tracking error, rms, {motion(units.output)[1]}"
+        table(title, ("feedback", "alone", "+ kS kV kA", "compensated", "worst", f"largest {units.input}"), errors)
     if used.tracking:
         say(f"  {_compensation(used.tracking[0])}")
     for effect, why in used.not_undone:

@@ -1,4 +1,4 @@
-"""A refined model under a controller: PID on the position's error, filters, feedforward, limit, encoder noise and counts."""
+"""A refined model under a controller: PID on the position's error, filters, state feedback, feedforward, limit, encoder noise and counts."""
 
 from __future__ import annotations
 
@@ -23,11 +23,22 @@ APART = "apart"  # the state of an effect with a gap: motor minus load, m
 
 
 @dataclass(frozen=True, slots=True)
+class States:
+    """z = free z + b e + drive v, v = c z within the limit, which is written one period after the reading; free: (n, n), the others: (n,)."""
+
+    free: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    b: FloatArray = field(default_factory=lambda: np.zeros(0))
+    c: FloatArray = field(default_factory=lambda: np.zeros(0))
+    drive: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, slots=True)
 class Controller:
-    """u = filters(kp e + ki int e + kd de/dt) + feedforward, e = path - encoder, sampled with the path, clipped at ``limit``.
+    """u = filters(kp e + ki int e + kd de/dt) + states + feedforward, e = path - encoder, sampled with the path, clipped at ``limit``.
 
     kp: V/m; ki: V/m/s; kd: V s/m; derivative_time: s, of the first-order low-pass on de/dt (0: none)
     sections: (k, 5) second-order sections b0, b1, b2, a1, a2 that the feedback's voltage passes
+    states: a controller with states of its own, whose voltage is added
     limit: V; the integral is held while the voltage is clipped and the error would drive it further (clamping)
     """
 
@@ -37,6 +48,7 @@ class Controller:
     derivative_time: float = 0.0
     sections: FloatArray = field(default_factory=lambda: np.zeros((0, 5)))
     limit: float = NO_LIMIT
+    states: States | None = None
 
     def keeps(self, sampling_rate: float) -> float:
         """Factor by which the filtered derivative decays in a sample."""
@@ -80,11 +92,12 @@ class Tracked:
 def loop_text(name: str) -> str:
     """Source of the loop; its arguments are those of ``follow_path`` in numbers."""
     return f"""\
-def {name}(path, extra, gains, sections, noise, count, behind, p, on, z, a, still, s, w, position, shown, voltage, carried):
+def {name}(path, extra, gains, sections, free, b, c, drive, noise, count, behind, p, on, z, a, still, s, w, position, shown, voltage, carried):
     kp, ki, kd, keeps, limit, h = gains[0], gains[1], gains[2], gains[3], gains[4], gains[5]
     inside = np.zeros((sections.shape[0], 2))
+    own, after = np.zeros(c.size), np.zeros(c.size)
     place = s[0]
-    total = rate = before = 0.0
+    total = rate = before = drove = 0.0
     for i in range(path.size):
         position[i] = place
         carried[i] = s[0]
@@ -105,11 +118,19 @@ def {name}(path, extra, gains, sections, noise, count, behind, p, on, z, a, stil
             inside[j, 0] = sections[j, 1] * u - sections[j, 3] * out + inside[j, 1]
             inside[j, 1] = sections[j, 2] * u - sections[j, 4] * out
             u = out
+        for j in range(c.size):
+            after[j] = b[j] * error + drive[j] * drove
+            for k in range(c.size):
+                after[j] += free[j, k] * own[k]
+        for j in range(c.size):
+            own[j] = after[j]
+            u += c[j] * own[j]
         u += extra[i]
         held = min(max(u, -limit), limit)
         if held == u or (u - held) * ki * error < 0.0:
             total += ki * error * h
         voltage[i] = held
+        drove = held - extra[i]
         place = step(held, p, on, z, a, still, s, w)
 """
 
@@ -136,7 +157,9 @@ def follow_path(
     given = np.zeros(count) if extra is None else np.ascontiguousarray(extra, dtype=np.float64)
     sections = np.ascontiguousarray(controller.sections, dtype=np.float64)
     numbers = (ready.parameters, ready.flags, ready.numbers, ready.moving, ready.still, state, room)
-    asked = (np.ascontiguousarray(path.position), given, gains, sections, noise, encoder.count, _behind(ready))
+    own = controller.states or States()
+    states = [np.ascontiguousarray(one, dtype=np.float64) for one in (own.free, own.b, own.c, own.drive)]
+    asked = (np.ascontiguousarray(path.position), given, gains, sections, *states, noise, encoder.count, _behind(ready))
     _loop_of(library)(*asked, *numbers, position, shown, voltage, carried)
     return Tracked(position=position, shown=shown, voltage=voltage, error=path.position - position, carried=carried)
 

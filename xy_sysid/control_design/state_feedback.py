@@ -20,6 +20,7 @@ import numpy as np
 import scipy.linalg
 
 from xy_sysid.comparison.physical_model import PhysicalModel
+from xy_sysid.control_design.closed_loop import Controller, States
 from xy_sysid.control_design.feedback import TURN, USUAL, Asked, Margins, first_kept, loop_systems, margins_of
 from xy_sysid.control_design.sampled import Sampled, grid, on_grid, response_of
 from xy_sysid.response.frf import ComplexArray
@@ -54,6 +55,10 @@ class StateFeedback:
     count: int
     rejects: float
     settles: float
+
+    def controller(self, limit: float) -> Controller:
+        """The controller that a path is followed with; limit: V."""
+        return Controller(0.0, 0.0, 0.0, limit=limit, states=States(self.free, self.b, self.c, self.drive))
 
     @property
     def a(self) -> FloatArray:

@@ -153,6 +153,8 @@ def use(
         ends = [centre, between[1], between[0], centre]
     if ends and drive < NO_LIMIT:
         quick = _tried("fastest path", lambda: fastest(models, ends, drive, rate), refused)
+    soon = later(model, max(wait - 1.0 / rate, 0.0))  # a period of calculation is part of the design of the state feedback
+    states = _tried("state feedback", lambda: state_feedback(_placed(soon, sensed), rate, asked), refused)
     followed: list[tuple[Tracking, Compensation]] = []
     if loop is not None:
         paths = []
@@ -164,7 +166,9 @@ def use(
             whole = recorded(run.position, rate, FOLLOWED * loop.bandwidth)
             paths.append(("the recorded motion", whole.part(edge, min(len(run) - edge, edge + round(LONGEST * rate)))))
         slow = samples(late, WORST_OF)
-        followed = [tracked(slow, found, loop.controller, path, encoder) for path in paths]
+        others = [] if better is None else [(f"with the {better[0].kind}", better[1].controller)]
+        others += [("state feedback", states.controller(drive))] if states is not None and calculation >= 1.0 else []
+        followed = [tracked(slow, found, loop.controller, path, encoder, others) for path in paths]
     return Used(
         axis=model.axis or (run.axis if run is not None else "x"),
         model=model,
@@ -179,7 +183,7 @@ def use(
         tables=(*(() if between is None else position_tables(model, between)), *([] if table is None else [table.correction(model)])),
         gap=_gap(model),
         feedback=loop,
-        states=_tried("state feedback", lambda: state_feedback(_placed(later(model, max(wait - 1.0 / rate, 0.0)), sensed), rate, asked), refused),
+        states=states,
         modes=swings,
         notch=_tried("notch", lambda: notch(swings[0], rate), refused) if swings and loop is not None else None,
         allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked, wait), refused),

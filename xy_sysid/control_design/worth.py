@@ -45,12 +45,24 @@ class Predicted:
 
 
 @dataclass(frozen=True, slots=True)
+class Loop:
+    """Another feedback along the same path: tracking errors, m rms, alone and with the compensation, and of the worst sample with it; largest: V."""
+
+    name: str
+    alone: float
+    compensated: float
+    worst: float
+    largest: float
+
+
+@dataclass(frozen=True, slots=True)
 class Tracking:
     """Simulated tracking errors of the load, m rms, behind gap and scale error, under the same feedback.
 
     path: in words; feedback, simple, whole, compensated: alone, with kS, kV and kA, with every law inverted, with the laws whose inversion helps
     worst: of the compensated axis over samples of its parameters; largest: V, the largest voltage of any of them; limit: V
     undone, left: laws that the compensation inverts, and (law, why) of the others
+    loops: the other feedbacks that were designed, with the same compensation
     """
 
     path: str
@@ -63,6 +75,7 @@ class Tracking:
     limit: float
     undone: tuple[str, ...]
     left: tuple[tuple[str, str], ...]
+    loops: tuple[Loop, ...] = ()
 
 
 def encoder_of(run: Run) -> Encoder:
@@ -118,9 +131,17 @@ def clear_below(model: PhysicalModel, run: Run) -> float:
 
 
 def tracked(
-    models: Sequence[AxisModel], found: Gains, controller: Controller, path: tuple[str, SampledPath], encoder: Encoder
+    models: Sequence[AxisModel],
+    found: Gains,
+    controller: Controller,
+    path: tuple[str, SampledPath],
+    encoder: Encoder,
+    others: Sequence[tuple[str, Controller]] = (),
 ) -> tuple[Tracking, Compensation]:
-    """The path followed by the first model with each feedforward, and the compensation; the other models are samples of its parameters."""
+    """The path followed by the first model with each feedforward, and the compensation; the other models are samples of its parameters.
+
+    others: names and controllers of ``Tracking.loops``
+    """
     name, wanted = path
     made = compensate(models, found, wanted, controller, encoder)
     noise = shake(models[0], float(wanted.position[0]), wanted.sampling_rate, controller, encoder)
@@ -136,5 +157,19 @@ def tracked(
         limit=controller.limit,
         undone=made.terms,
         left=made.left,
+        loops=tuple(_loop(which, made, wanted, other, models, encoder) for which, other in others),
     )
     return told, made
+
+
+def _loop(name: str, made: Compensation, wanted: SampledPath, controller: Controller, models: Sequence[AxisModel], encoder: Encoder) -> Loop:
+    alone = follow_path(models[0], wanted, controller, None, encoder)
+    runs = [follow_path(model, made.path, controller, made.voltage, encoder) for model in models]
+    errors = [_rms(wanted.position - run.carried) for run in runs]
+    largest = max(float(np.max(np.abs(run.voltage))) for run in runs)
+    return Loop(name, _rms(wanted.position - alone.carried), errors[0], max(errors), largest)
+
+
+def _rms(values: FloatArray) -> float:
+    value = float(np.sqrt(np.mean(values**2)))
+    return value if math.isfinite(value) else math.inf
