@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Literal, NamedTuple
@@ -203,3 +203,8 @@ def position_of(unit: str) -> str:
 def over(top: str, bottom: str) -> str:
     """One unit over another: m/V, rad/(N m)."""
     return f"{top}/{bottom}" if bottom.isalpha() else f"{top}/({bottom})"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a sentence: a, b and c."""
+    return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else "".join(names)

@@ -167,7 +167,7 @@ def _loop(name: str, made: Compensation, wanted: SampledPath, controller: Contro
     runs = [follow_path(model, made.path, controller, made.voltage, encoder) for model in models]
     errors = [_rms(wanted.position - run.carried) for run in runs]
     largest = max(float(np.max(np.abs(run.voltage))) for run in runs)
-    return Loop(name, _rms(wanted.position - alone.carried), errors[0], max(errors), largest)
+    return Loop(name=name, alone=_rms(wanted.position - alone.carried), compensated=errors[0], worst=max(errors), largest=largest)
 
 
 def _rms(values: FloatArray) -> float:

@@ -15,7 +15,7 @@ from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.greybox.one_step import one_step_effect
 from xy_sysid.hypotheses.criteria import AT_FLOOR, DOUBTFUL
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.units import bare, moved
+from xy_sysid.units import bare, listed, moved
 
 
 def missing(data: AxisData, found: Answer, unsure: Sequence[str], with_all: float) -> str:
@@ -146,11 +146,6 @@ def look_alikes(found: Answer, library: Library) -> tuple[LookAlike, ...]:
             text = f"these data cannot distinguish {name} from {other}"
         alike.append(LookAlike(other, apart, text, library[name].experiment))
     return tuple(alike)
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names in a sentence."""
-    return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else "".join(names)
 
 
 def percent(part: float) -> str:

@@ -14,6 +14,7 @@ from xy_sysid.imports.names import Meaning, by_unit, meaning, tells_time
 from xy_sysid.imports.reading import OF_AN_AXIS, Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
 from xy_sysid.samples.recording import SLOWEST
+from xy_sysid.units import listed
 
 CONTRACT: Mapping[str, tuple[str, ...]] = {
     "input": ("voltage", "u", "input"),
@@ -167,7 +168,7 @@ def _by_words(sheet: Sheet, meanings: Mapping[str, Meaning], role: str, notes: l
         best = [column for rank, column in columns if rank == least]
         found[axis] = sheet.usable(best[0])
         if len(best) > 1 and role != "reference":
-            names = " and ".join(repr(column.name) for column in best)
+            names = listed([repr(column.name) for column in best])
             what = f"{axis}.{role}" if axis else role
             raise BadRecording(sheet.path, f"{names} may both be the {role}", f"Choose one with --map {what}={best[0].name!r}.")
         others = [column.name for rank, column in columns if rank > least]
@@ -180,7 +181,7 @@ def _by_unit(sheet: Sheet, meanings: Mapping[str, Meaning], role: str) -> Found:
     """The column that has a role by its unit or symbol alone; raises BadRecording if there are several."""
     columns = [column for column in sheet.columns if column.name not in meanings and not column.words and by_unit(column.name, column.unit) == role]
     if len(columns) > 1:
-        names = " and ".join(repr(column.name) for column in columns)
+        names = listed([repr(column.name) for column in columns])
         raise BadRecording(sheet.path, f"{names} may both be the {role}", f"Choose one with --map {role}={columns[0].name!r}.")
     return {"": sheet.usable(columns[0])} if columns else {}
 
@@ -197,7 +198,7 @@ def _named(sheet: Sheet, found: dict[str, Found], notes: list[str]) -> dict[str,
     if not axes:
         raise BadRecording(sheet.path, f"no axis has both an input and an output; {sheet.names()}", EXAMPLE)
     if set(found["input"]) != set(found["output"]):
-        have = f"{' and '.join(_axis(axis) for axis in axes)} {'has' if len(axes) == 1 else 'have'}"
+        have = f"{listed([_axis(axis) for axis in axes])} {'has' if len(axes) == 1 else 'have'}"
         notes.append(f"only {have} both an input and an output; the others are left out")
     return {role: {_axis(axis): column for axis, column in columns.items()} for role, columns in found.items()}
 

@@ -16,6 +16,7 @@ from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.registry import BAG, format_of, sheet_of
 from xy_sysid.imports.sheet import Sheet
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import listed
 
 
 def of_several_files(path: Path, reading: Reading, notes: list[str]) -> tuple[Sheet, Reading] | None:
@@ -40,7 +41,7 @@ def of_several_files(path: Path, reading: Reading, notes: list[str]) -> tuple[Sh
         replace(sheets[file].find(name), name=f"{what} in {file.name}", clock=None if clocks is None else clocks[file])
         for what, (file, name) in chosen.items()
     ]
-    files = " and ".join(file.name for file in used)
+    files = listed([file.name for file in used])
     rows = {file.name: len(sheets[file].find(name).values) for file, name in chosen.values()}
     if clocks is None and len(set(rows.values())) > 1:
         counts = ", ".join(f"{name} {count}" for name, count in rows.items())

@@ -7,6 +7,7 @@ from typing import Any
 from xy_sysid.report.story_parts import Document, words
 from xy_sysid.report.story_words import confidence, status
 from xy_sysid.report.words import moved, number
+from xy_sysid.units import listed
 
 NOTHING_YET = "Not fitted yet"
 LACKING = "Not enough data"
@@ -47,7 +48,7 @@ def detail(document: Document) -> str:
         if document["verdict"] is None:
             return _fails(document)
         return f"{str(document['sentence']).rstrip()} {confidence(document)}".rstrip()
-    names = " and ".join(words(name) for name in last["effects"])
+    names = listed([words(name) for name in last["effects"]])
     left = _error(document, last)
     if last["explained"]:
         return f"With {names} the residual error is {left}: it is at the noise floor ({_floor(document, last)})."
