@@ -200,7 +200,10 @@ class Drive:
         backwards = [] if self.settings.holds else self._sign.saw(seq, values, self._noise)
         if backwards:
             what = "voltage" if self.settings.output == "blocks" else self.settings.interface
-            return f"{self.axes[backwards[0]]}: plus {what} moves it to minus: swap the motor's wires or the encoder's sign"
+            return (
+                f"{self.axes[backwards[0]]}: plus {what} moves it to minus: swap the motor's wires or the encoder's sign, unless run --first "
+                "finds that plus is plus: then its delay is too long for a signal this fast, so lower the setting low"
+            )
         return self._motion.saw(seq, values)
 
     @property
