@@ -358,3 +358,12 @@ def test_compare_says_that_input_and_output_do_not_belong_together(strange: str,
     assert "does not describe this axis" in cli("compare", file).err
     assert "does not describe this axis" in cli("compare", file, "--json").json["notes"][-1]
     assert "does not describe this axis" not in cli("compare", npz(tmp_path / "right.npz")).err
+
+
+def test_compare_without_a_model_says_which_model_its_numbers_belong_to(tmp_path: Path) -> None:
+    """Its linear model and its third of the data are not those of diagnose and report, so its multiple of the floor differs; no note with a model."""
+    file, model = npz(tmp_path / "a.npz"), tmp_path / "model.yaml"
+    for said in (cli("compare", file).err.replace("\n  ", " "), " ".join(cli("compare", file, "--json").json["notes"])):
+        assert "a linear model of the first two thirds, on the last third" in said
+    assert cli("fit", file, *RIGID, "--model", model).code == 0
+    assert "of a linear model of the first two thirds" not in cli("compare", npz(tmp_path / "b.npz", rows=20_000), model).err

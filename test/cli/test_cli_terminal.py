@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import ROOT
 from helpers.cli_tools import RIGID, Said, cli, npz, rigid
 
 from xy_sysid.imports import save
@@ -84,3 +86,20 @@ def test_a_model_file_cannot_steer_the_terminal(tmp_path: Path) -> None:
     shown(cli("validate", good, model))
     model.write_text('format: "xy_sysid linear model 1"\naxes: {"x\\e[31m": {"hold": "\\e[31m"}}\n', encoding="utf-8")
     shown(cli("validate", good, model))
+
+
+def test_every_text_for_a_terminal_is_made_harmless() -> None:
+    """Each direct write to stdout or stderr uses ``printable``, or is in this table: JSON, or a text of the project's own."""
+    bold = {
+        f"{path.relative_to(ROOT)}: {line.strip()}"
+        for path in (ROOT / "xy_sysid").rglob("*.py")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if re.search(r"sys\.(stdout|stderr)\.write\(|^\s+print\(", line) and "printable(" not in line
+    }
+    assert bold == {
+        "xy_sysid/__init__.py: print(step.added, step.held_out_error)",  # an example in a docstring
+        'xy_sysid/cli/output.py: sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\\n")',
+        "xy_sysid/files/ros_parameters.py: sys.stdout.write(default_text())",
+        "xy_sysid/files/viewer_layouts.py: sys.stdout.write(made[sys.argv[1]]())",
+        "xy_sysid/fleets/columns_doc.py: sys.stdout.write(document())",
+    }

@@ -39,6 +39,21 @@ def test_an_operator_overrides_whom_he_was_told_of_and_nobody_else() -> None:
     assert latch.holders == (A,)
 
 
+def test_a_short_stop_is_not_forgotten() -> None:
+    """True and false between two looks of the drive, or a STOP that arrives with an operator's release: the drive learns of it once."""
+    latch = StopLatch()
+    assert not latch.asked()
+    latch.heard(A, 1, True)
+    latch.heard(A, 2, False)
+    assert list(latch.holders) == [] and latch.asked() and not latch.asked()
+    latch.heard(B, 1, True)
+    latch.release(0.0, bytes.decode)
+    assert latch.release(1.0, bytes.decode)[0] and list(latch.holders) == []
+    assert latch.asked() and not latch.asked()
+    latch.heard(A, 3, False)
+    assert not latch.asked()
+
+
 @given(st.lists(st.tuples(st.integers(0, 300), st.booleans()), max_size=400))
 def test_it_is_on_exactly_while_somebody_said_so_last(messages: list[tuple[int, bool]]) -> None:
     """With any number of nodes that appear and disappear, no holder is forgotten."""

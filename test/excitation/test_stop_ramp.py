@@ -54,3 +54,30 @@ def test_stop_is_over_in_a_tenth_of_a_second(way: str, before: str) -> None:
     late = round(CAP * settings.rate)
     assert not values[late + step :].any() and drive.report().state == "stopped"
     assert np.abs(np.diff(values[:, 0])).max() < 0.02, "it fades, and does not jump"
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("changed", [{"offset": 0.9}, {"offset": -0.9}, {"rms": 0.9, "limit": 1.0}, {"offset": 0.9, "limit": 1.0, "centring": 1.0}])
+def test_settings_that_arrive_during_stop_do_not_raise_the_output(changed: dict[str, float], way: str) -> None:
+    """Offset, rms, limit and centring raised right after STOP: the output never exceeds its value at STOP, and smaller values are used."""
+    axis = AxisExcitation(kind="multisine", offset=0.05, centring=0.0, limit=0.1, rms=0.02, low=5.0, high=20.0)
+    settings = ExcitationSettings(axes={"x": axis}, **{**WAYS[way], "ramp": 0.0})
+    rows = settings.block
+
+    def after_stop(change: dict[str, float]) -> np.ndarray:
+        drive, sent = Drive(settings, watched=False), []
+        drive.start()
+        for k in range(40):
+            seq = np.arange(drive.seq - rows, drive.seq, dtype=np.float64)
+            drive.see(Block(("x",), seq, seq / settings.rate, np.zeros((rows, 1))))
+            if k == 20:
+                drive.obey_stop()
+                drive.change(settings.model_copy(update={"axes": {"x": axis.model_copy(update=change)}}))
+            values = drive.next(rows).values
+            sent += [values] * (k >= 20)
+        assert drive.state == "stopped"
+        return np.concatenate(sent)[:, 0]
+
+    usual = after_stop({})
+    assert usual.any() and np.array_equal(after_stop(changed), usual)
+    assert np.abs(after_stop({"offset": 0.0, "rms": 0.0})).sum() < np.abs(usual).sum()

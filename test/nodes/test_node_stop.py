@@ -119,6 +119,29 @@ def test_stop_is_quick_whatever_the_ramps_are(world: World) -> None:
         world.spin(0.2)
 
 
+@pytest.mark.parametrize("latched", [True, False])
+def test_a_stop_that_is_released_at_once_stops_nevertheless(world: World, latched: bool) -> None:
+    """True and false a moment later, as of a push button: zero volts, inactive, with STOP as the reason; then activate is allowed."""
+    from std_msgs.msg import Bool
+
+    from xy_sysid.nodes.common import LATCHED_QOS
+
+    blocks, statuses = world.blocks(), world.statuses()
+    world.machine(Integrator())
+    world.start(EXCITATION, QUIET)
+    stop = world.node.create_publisher(Bool, "stop", LATCHED_QOS if latched else 10)
+    assert world.transition("excitation", "configure")
+    assert world.until(lambda: stop.get_subscription_count() >= 1 + latched)
+    for _ in range(3):
+        assert world.transition("excitation", "activate")
+        driving(world, blocks)
+        stop.publish(Bool(data=True))
+        stop.publish(Bool(data=False))
+        assert world.until(lambda: world.state("excitation") == "inactive", 3.0) and not blocks[-1].values.any()
+        assert world.until(lambda: any(status.message == "STOP" for status in statuses), 3.0)
+        statuses.clear()
+
+
 def alone(process: NodeProcess) -> bool:
     return "configure is refused" in process.output()
 

@@ -23,6 +23,7 @@ from xy_sysid.units import told
 
 HELD_OUT = 1.0 / 3.0  # of the recording, if the model was fitted to it
 SEEN = "the model was fitted to this recording; only its last third is used"
+OWN = "these numbers are of a linear model of the first two thirds, on the last third; to judge another model, give its file"
 
 MOST_LEFT = 0.7  # of the motion: half of its power
 HARDLY = "The model explains little of the motion: it does not describe this axis, or input and output do not belong together."
@@ -78,6 +79,7 @@ def better(data: Run | Recording, before: AnyModel, after: AnyModel) -> Paired:
 def judge(recording: Recording, axis: str, model: AnyModel | None, settings: IdentifierSettings) -> Judgement:
     """Compare on the full recording if the model is from another one, else on its last third; without a model, fit one to the rest."""
     seen = model is not None and recording.run(axis).digest in model.data
+    said = SEEN if seen else OWN if model is None else ""
     data = recording
     if model is None:
         training, data = split(recording, HELD_OUT)
@@ -91,7 +93,7 @@ def judge(recording: Recording, axis: str, model: AnyModel | None, settings: Ide
     with np.errstate(over="ignore", invalid="ignore"):  # a model that diverges
         where = compare_motion(velocity, unseen)
     hardly = HARDLY if np.isfinite(where.error) and where.error > MOST_LEFT * where.motion else ""
-    notes = tuple(text for text in (model.doubt, SEEN if seen else "", hardly) if text)
+    notes = tuple(text for text in (model.doubt, said, hardly) if text)
     try:
         return Judgement(where, in_frequency(data, axis, model, settings)[0], notes)
     except BadInput:  # too short for a window, or nothing coherent: use the time domain only

@@ -135,7 +135,10 @@ class Drive:
         return self._fade_from * 0.5 * (1 + float(np.cos(np.pi * at / self._fade_length)))
 
     def change(self, settings: ExcitationSettings) -> None:
-        """Use new settings from the next block on; raises BadInput for a setting that cannot change while active."""
+        """Use new settings from the next block on; raises BadInput for a setting that cannot change while active.
+
+        While the drive fades out, they never make the voltage greater.
+        """
         if self.state in ("active", "stopping"):
             before = {item.name: item.value for item in knobs(self.settings)}
             for item in knobs(settings):
@@ -144,7 +147,13 @@ class Drive:
                     live_names = ", ".join(sorted(LIVE_AXIS | LIVE))
                     raise BadInput(item.name, f"to change to {item.value} while active", f"while active: {live_names}", "Deactivate first.")
         check_loop(settings)
+        old = self._rms, self._steady, self._limit, self._centring
         self._use(settings)
+        if self.state == "stopping":  # a voltage that fades out does not rise again
+            new = self._rms, self._steady, self._limit, self._centring
+            self._rms, self._steady, self._limit, self._centring = (
+                np.where(np.abs(after) > np.abs(before), before, after) for before, after in zip(old, new, strict=True)
+            )
 
     def see(self, block: Block, overdue: int = 0) -> bool:
         """Read positions, (n, axes) in m; returns False if they are not usable (``unusable`` gives the reason).
@@ -191,7 +200,10 @@ class Drive:
         backwards = [] if self.settings.holds else self._sign.saw(seq, values, self._noise)
         if backwards:
             what = "voltage" if self.settings.output == "blocks" else self.settings.interface
-            return f"{self.axes[backwards[0]]}: plus {what} moves it to minus: swap the motor's wires or the encoder's sign"
+            return (
+                f"{self.axes[backwards[0]]}: plus {what} moves it to minus: swap the motor's wires or the encoder's sign, unless run --first "
+                "finds that plus is plus: then its delay is too long for a signal this fast, so lower the setting low"
+            )
         return self._motion.saw(seq, values)
 
     @property

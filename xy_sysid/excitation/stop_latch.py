@@ -22,6 +22,7 @@ class StopLatch:
 
     def __init__(self) -> None:
         self._said: dict[bytes, _Said] = {}
+        self._asked = False
         self._named: tuple[float, frozenset[bytes]] = (0.0, frozenset())  # s until which the operator may confirm, and the named holders
 
     @property
@@ -29,12 +30,18 @@ class StopLatch:
         """Publishers that hold STOP, in the order of their first messages."""
         return tuple(publisher for publisher, said in self._said.items() if said.on)
 
+    def asked(self) -> bool:
+        """True if any publisher requested STOP since the last call, even if it has released it meanwhile: a short STOP stops, too."""
+        asked, self._asked = self._asked, False
+        return asked
+
     def heard(self, publisher: bytes, number: int, on: bool) -> None:
         """Take a message and its number; one older than the last of its publisher came by the second subscription, and is ignored."""
         before = self._said.get(publisher)
         if before is not None and number < before.number:
             return
         self._said[publisher] = _Said(number, on)
+        self._asked = self._asked or on
         silent = [one for one, said in self._said.items() if not said.on and one != publisher]
         for one in silent[: max(0, len(silent) - KEPT)]:
             del self._said[one]

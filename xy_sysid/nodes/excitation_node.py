@@ -79,6 +79,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._until: float | None = None  # s, steady time at which the last sent block ends
         self._loud = False  # the last published block was not all zeros
         self._complaint = ""
+        self._stop_on = False  # at the last look
         self._stop_told = ""  # the last logged sentence on STOP
         self._unnamed = 0.0  # s for which another publisher has been present without a name
         self._refused = ""  # why the last transition was refused
@@ -211,16 +212,18 @@ class ExcitationNode(Overridable, LifecycleNode):
             self._report()
 
     def _obey_stop(self) -> bool:
-        """Read the topic STOP, and begin to fade out if it is on; returns whether it was switched on."""
-        if self._stop.listen():
-            if self._stop.held and self._drive is not None and not self.has_stopped():
-                with self._hold:
-                    self._drive.obey_stop()
-            if not self._stop.held:
-                self.get_logger().warning("STOP is released: activate is allowed again")
+        """Read the topic STOP, and begin to fade out if it is on or was on since the last call; returns whether it was."""
+        before = self._stop_on
+        wanted = self._stop.listen() or self._stop.held
+        self._stop_on = self._stop.held
+        if wanted and self._drive is not None and not self.has_stopped():
+            with self._hold:
+                self._drive.obey_stop()
+        if before and not self._stop_on:
+            self.get_logger().warning("STOP is released: activate is allowed again")
+        if before != self._stop_on:
             self._report()
-            return self._stop.held
-        return False
+        return wanted
 
     # another excitation
 

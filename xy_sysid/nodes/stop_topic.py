@@ -58,13 +58,15 @@ class StopTopic:
         return [self._name(one) for one in self._latch.holders]
 
     def listen(self) -> bool:
-        """Take the received messages; returns whether STOP has changed."""
-        before = self._latch.holders
+        """Take the received messages; returns whether STOP was requested since the last call, even if it is released again."""
+        self._receive()
+        return self._latch.asked()
+
+    def _receive(self) -> None:
         for subscription in self._heard:
             with subscription:
                 while self._one(subscription):
                     pass
-        return bool(before) != self.held
 
     def close(self) -> None:
         """End the subscriptions."""
@@ -102,7 +104,7 @@ class StopTopic:
         return self._names.get(publisher, "a publisher without a name") + gone
 
     def _on_release(self, _request: Any, response: Any) -> Any:
-        self.listen()
+        self._receive()  # a STOP among these messages is obeyed at the next ``listen``
         response.success, response.message = self._latch.release(time.monotonic(), self._name)
         self._node.get_logger().warning(response.message)
         return response

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from xy_sysid.errors import BadInput
 from xy_sysid.page.session import Session
+from xy_sysid.processes.terminal import printable
 from xy_sysid.story.attempt import BROKEN, Attempt
 
 Made = TypeVar("Made")
@@ -23,7 +24,7 @@ async def beside(session: Session, work: Callable[[], Awaitable[Made]]) -> Made 
     except OSError as error:
         problem = f"{f'{error.filename}: ' if error.filename else ''}{error.strerror or BROKEN}"
     if attempt.detail:
-        sys.stderr.write(f"{attempt.detail}\n")
+        sys.stderr.write(printable(attempt.detail) + "\n")
     session.say(problem)
     return None
 
@@ -37,5 +38,5 @@ def asked(arguments: Sequence[str], what: tuple[str, str, str]) -> str:
     lines = [line for line in done.stderr.splitlines() if line.strip()]
     refused = bool(lines) and lines[-1].startswith("xy-sysid: ")
     if not refused:
-        sys.stderr.write(done.stderr)
+        sys.stderr.write(printable(done.stderr))
     raise BadInput(*what, lines[-1] if refused else BROKEN)

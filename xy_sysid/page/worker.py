@@ -15,6 +15,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from xy_sysid.page.orders import Order, Reading, WorkerNews
+from xy_sysid.processes.terminal import printable
 from xy_sysid.story.attempt import BROKEN, Attempt
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ def main(path: str, reading: Reading, orders: Connection, words: Connection) -> 
     with Attempt(BROKEN) as opening:
         desk = Desk(Path(path), reading, say)
     if opening.problem:
-        sys.stderr.write(f"{path}: {opening.detail}\n" if opening.detail else "")
+        sys.stderr.write(printable(f"{path}: {opening.detail}") + "\n" if opening.detail else "")
         words.send(WorkerNews("closed", words=opening.problem))
         return
     while True:
@@ -128,5 +129,5 @@ def main(path: str, reading: Reading, orders: Connection, words: Connection) -> 
             words.send(WorkerNews("failed", order.number, order.axis, "Left as it was."))
             continue
         if attempt.detail:
-            sys.stderr.write(f"axis {order.axis}, {order.act}: {attempt.detail}\n")
+            sys.stderr.write(printable(f"axis {order.axis}, {order.act}: {attempt.detail}") + "\n")
         words.send(WorkerNews("failed" if attempt.problem else "done", order.number, order.axis, attempt.problem))

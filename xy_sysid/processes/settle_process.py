@@ -14,6 +14,7 @@ from typing import Any
 
 from xy_sysid.files.effects import library
 from xy_sysid.files.walk import plan_of, run_of, step_document
+from xy_sysid.processes.terminal import printable
 from xy_sysid.story.attempt import Attempt
 
 NICE = 10  # niceness of the process: receiving data has priority
@@ -80,7 +81,7 @@ def work(pipe: Connection, told: dict[str, Any], effect_files: tuple[str, ...]) 
                 before = step(plan, runs, before, lambda part: pipe.send(DecisionNews(part)))
                 pipe.send(DecisionNews(1.0, step_document(before)))
             if attempt.detail:
-                sys.stderr.write(f"{bag}: {attempt.detail}\n")
+                sys.stderr.write(printable(f"{bag}: {attempt.detail}") + "\n")
             if attempt.problem:
                 pipe.send(DecisionNews(problem=attempt.problem))
     except (EOFError, OSError):

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from xy_sysid.files.effects import library
 from xy_sysid.processes.deaf import deaf
+from xy_sysid.processes.terminal import printable
 from xy_sysid.story.acts import Job, perform
 from xy_sysid.story.attempt import Attempt
 from xy_sysid.story.document import document
@@ -134,7 +135,7 @@ def work(pipe: Connection, effect_files: tuple[str, ...]) -> None:
                     text = "" if story is None else json.dumps(document(story), allow_nan=False, separators=(",", ":"))
                     pipe.send(JobNews(number, doing, story, text))
             if attempt.detail:
-                sys.stderr.write(f"axis {job.run.axis}, {job.act}: {attempt.detail}\n")
+                sys.stderr.write(printable(f"axis {job.run.axis}, {job.act}: {attempt.detail}") + "\n")
             pipe.send(JobNews(number, "", ended=True, problem=attempt.problem))
     except (EOFError, OSError):
         return
