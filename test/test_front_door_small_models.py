@@ -44,7 +44,8 @@ def test_a_servo_gives_its_stiffness_and_the_numbers_of_mujoco(tmp_path: Path) -
     found = xy.servo(xy.load(tmp_path / "servo.csv", columns=columns, units=units))
     assert found["stiffness"].value == pytest.approx(400.0, rel=0.1)
     rows = {str(row[0]): row for row in found.in_si(0.01)}
-    assert rows["kp"][1] == pytest.approx(0.01 * found["stiffness"].value)
+    assert rows["kp"][1] == pytest.approx(0.01 * found["stiffness"].value) and rows["kp"][5] is None
+    assert {str(row[0]): row for row in found.in_si(0.01, gear="20")}["kp"][5] == pytest.approx(0.01 * found["stiffness"].value / 400)
     assert found.sentences[0] in str(found)
     with pytest.raises(xy.BadInput, match="inertia is -1"):
         found.in_si(-1.0)

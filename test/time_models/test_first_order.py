@@ -76,6 +76,15 @@ def test_a_level_that_ends_too_soon_is_extrapolated_and_that_is_said() -> None:
     assert any("extrapolated" in sentence for sentence in first_order_words(found))
 
 
+def test_what_is_left_out_of_a_long_recording_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samples after the first 20,000 are not used; here after the first 1000 of 1560."""
+    assert first_order(both_ways()).unused == 0.0
+    monkeypatch.setattr("xy_sysid.time_models.first_order.MOST", 1000)
+    found = first_order(both_ways())
+    assert found.unused == pytest.approx(560 / RATE)
+    assert any("The remaining 2.8 s of the data are not used" in sentence for sentence in first_order_words(found))
+
+
 def test_an_input_that_never_changes_is_refused() -> None:
     """It determines nothing."""
     run = moved(np.zeros(100))
