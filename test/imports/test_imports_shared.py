@@ -26,7 +26,6 @@ SAYS: dict[str, str] = {
     "raw_mat/hsm150_idf_pos_0.06_1.mat": "rad/(N m)",
     "rm_arm/joint_1.npz": "rad/(N m)",
     "servo_target/chirp0.csv": "rad/rad",
-    "vendor_exports/dspace_bldc.mat": "rad/s/V",
     "vendor_exports/tc3_decimalcomma.csv": "15.62      0.00",
     "vendor_exports/tc3_default.csv": "15.62      0.00",
 }
@@ -68,6 +67,7 @@ FINDS: dict[str, dict[str, tuple[float | None, float, str]]] = {
     "tx40/joint1_merged.csv": {"friction": (0.216, 0.022, "A")},
     "ur10e/ur-20_01_22-joint_1.csv": {"friction": (1.38, 0.04, "A"), "kV": (2.17, 0.065, "A/(rad/s)")},
     "ur10e/ur-20_01_22-joint_6.csv": {"friction": (0.243, 0.007, "A"), "kV": (0.316, 0.01, "A/(rad/s)"), "kA": (0.049, 0.0025, "A/(rad/s2)")},
+    "vendor_exports/dspace_bldc.mat": {"gain": (236.5, 7.5, "rad/s/FS")},  # its Hall counts (30 a turn) over the duty give 229 to 244
     "vendor_exports/ctrlx_step.trace.csv": {
         "time_constant": (0.036, 0.003, "s"),
         "delay": (0.172, 0.003, "s"),
