@@ -33,6 +33,20 @@ def test_step_tests_of_several_recordings_give_gain_and_inertia() -> None:
     assert len(xy.mechanics(found)) == 0
 
 
+def test_a_current_moves_a_table_through_a_screw() -> None:
+    """A screw of 5 mm a turn: force = kt current 2 pi / lead; mass in kg and damping at the table, inertia in kg m^2 at the motor."""
+    screw = 2.0 * np.pi / 5e-3
+    made = [step_test(5.0), step_test(-5.0)]
+    found = xy.steps([xy.Recording.from_arrays(RATE, one.voltage[:, 0], 1e-2 * one.position[:, 0], units=("A", "m")) for one in made])
+    rows = {str(row[0]): row for row in xy.mechanics(found, kt=0.12, gear="5mm")}
+    mass, damping = rows["mass"], rows["damping"]
+    assert mass[1] == pytest.approx(0.12 * screw * 0.1 / 0.5e-2, rel=0.05) and (mass[4], mass[6]) == ("kg", "kg m^2")
+    assert mass[5] == pytest.approx(0.12 / screw * 0.1 / 0.5e-2, rel=0.05)
+    assert damping[1] == pytest.approx(0.12 * screw / 0.5e-2, rel=0.02) and (damping[4], damping[6]) == ("N s/m", "N m s/rad")
+    with pytest.raises(xy.BadInput, match="the way of one turn with its unit"):
+        xy.mechanics(found, kt=0.12, gear="50")
+
+
 def test_a_servo_gives_its_stiffness_and_the_numbers_of_mujoco(tmp_path: Path) -> None:
     """From a file, too; an inertia gives kp = inertia times stiffness."""
     rng = np.random.default_rng(1)
@@ -44,7 +58,8 @@ def test_a_servo_gives_its_stiffness_and_the_numbers_of_mujoco(tmp_path: Path) -
     found = xy.servo(xy.load(tmp_path / "servo.csv", columns=columns, units=units))
     assert found["stiffness"].value == pytest.approx(400.0, rel=0.1)
     rows = {str(row[0]): row for row in found.in_si(0.01)}
-    assert rows["kp"][1] == pytest.approx(0.01 * found["stiffness"].value)
+    assert rows["kp"][1] == pytest.approx(0.01 * found["stiffness"].value) and rows["kp"][5] is None
+    assert {str(row[0]): row for row in found.in_si(0.01, gear="20")}["kp"][5] == pytest.approx(0.01 * found["stiffness"].value / 400)
     assert found.sentences[0] in str(found)
     with pytest.raises(xy.BadInput, match="inertia is -1"):
         found.in_si(-1.0)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers import real_data
 from helpers.gap_machines import GapMachine, driven
 
-from xy_sysid.diagnosis.diagnose import diagnose
 from xy_sysid.effects import EFFECTS
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import fit_base
@@ -55,12 +53,3 @@ def test_the_answer_is_the_same_in_other_units() -> None:
 
 def _gap(data: AxisData) -> float:
     return filter_fit(data, fit_base(data), GAP)[0].parameter("backlash.gap").value
-
-
-@pytest.mark.parametrize(("name", "gap"), [("gap_hertz_16um", 16e-6), ("gap_linear_12um", 12e-6), ("gap_linear_37um", 37e-6)])
-def test_the_gaps_of_another_simulator_are_named(name: str, gap: float) -> None:
-    """Only backlash is named; the gap to 5 %."""
-    with np.load(real_data.data(f"gap_foreign/{name}.npz")) as arrays:
-        found = diagnose(float(arrays["fs"]), arrays["u"], arrays["y"])
-    assert found.effects == ("backlash",)
-    assert found.final.parameter("backlash.gap").value == pytest.approx(gap, rel=0.05)

@@ -161,3 +161,11 @@ def test_a_library_that_is_missing_is_one_line_that_names_the_extra(tmp_path: Pa
     assert f"pip install 'xy_sysid[{extra}]'" in str(caught.value) and "\n" not in str(caught.value)
     assert f'"{extra}":' in (Path(__file__).parents[2] / "setup.py").read_text("utf-8")
     assert "is not installed" in refused("frf", path)
+
+
+def test_the_page_names_every_format() -> None:
+    """Each ending and each extra of the registry is in the table of docs/files.md."""
+    page = (Path(__file__).parents[2] / "docs" / "files.md").read_text("utf-8")
+    table = page.partition("## Which files work")[2].partition("**Two files.**")[0].lower()
+    for form in FORMATS:
+        assert form.extra in table and form.kind in table, form.kind

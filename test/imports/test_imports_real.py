@@ -50,3 +50,12 @@ def test_the_second_encoder_can_be_chosen() -> None:
     """Another output of the same file is an argument; its unit is its own."""
     recording = load(data("lsb250/lsb250_exp1.npz"), columns={"output": "y2"})
     assert recording.output_unit == "m" and recording.position[0, 0] == pytest.approx(9.343e-3)
+
+
+def test_a_robot_whose_stamps_jitter_is_used_from_end_to_end() -> None:
+    """120 s at about 30 Hz with steps from 15 to 271 ms: one stretch with every sample, and not the longest of many."""
+    named = {"input": "tau_measured:3", "output": "q:3"}
+    recording = load(data("rm_arm/joint_3.npz"), columns=named, units={"input": "N m", "output": "rad"})
+    assert len(recording.runs()) == 1 and len(recording) >= 3146
+    assert recording.time[-1] - recording.time[0] == pytest.approx(120.0, abs=0.5)
+    assert any("3146 samples are resampled" in note for note in recording.notes)

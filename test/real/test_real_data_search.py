@@ -12,8 +12,9 @@ from helpers.real_data import data
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.diagnose import diagnose
+from xy_sysid.diagnosis.rungs import rungs_of
 from xy_sysid.greybox.axis_data import prepare
-from xy_sysid.greybox.free_run import fit_base, fit_with, fitted_score
+from xy_sysid.greybox.free_run import fit_with, fitted_score
 from xy_sysid.greybox.open_loop import open_loop, settled
 from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.imports import load
@@ -112,10 +113,10 @@ def test_two_like_inertias_on_a_shaft_are_a_compliance_and_no_base() -> None:
 
 
 def test_one_more_effect_never_ends_worse_than_the_model_that_it_was_added_to() -> None:
-    """If a slow pole explains all friction, the fit ends with hardly any friction, and not at a worse minimum."""
+    """If a slow pole explains all friction, the fit ends with hardly any friction, and not at a worse minimum; so does each rung of ``refine``."""
     rate = 1000.0
-    drive, speed = (np.loadtxt(data(f"generator/{name}_cc.csv"), delimiter=",").ravel()[:60_000] for name in ("x", "y"))
+    drive, speed = (np.loadtxt(data(f"generator/{name}_cc.csv"), delimiter=",").ravel()[:100_000] for name in ("x", "y"))
     prepared = prepare(rate, drive, np.cumsum(speed) / rate, units=Units("V", "rad"))
-    base = fit_base(prepared)
-    more = fit_with(prepared, base, ["coulomb_friction"])
-    assert fitted_score(prepared, more) < fitted_score(prepared, base) + 1e-6
+    base, load, both = (rung.fit for rung in rungs_of(prepared, STANDARD, ["constant_load", "coulomb_friction"]))
+    for less, more in ((base, load), (load, both), (base, fit_with(prepared, base, ["coulomb_friction"]))):
+        assert fitted_score(prepared, more) < fitted_score(prepared, less) + 1e-6

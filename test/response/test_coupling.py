@@ -85,12 +85,15 @@ def test_the_time_that_is_said_to_suffice_does_not_depend_on_the_recording() -> 
     assert 0.4 < long.needed / short.needed < 2.5
 
 
-def test_the_two_motors_of_a_corexy_are_taken_apart() -> None:
-    """By motors both are coupled; as x and y they are not."""
-    recording = machine(0.0, mix=np.array([[1.0, 1.0], [1.0, -1.0]]))
+@pytest.mark.parametrize(("combine", "axes"), [("corexy", ("x", "y")), ("gantry", ("travel", "yaw"))])
+def test_drives_that_both_move_both_axes_are_taken_apart(combine: str, axes: tuple[str, str]) -> None:
+    """By the motors of a CoreXY, or the sides of a gantry, both are coupled; as x and y, or travel and yaw, they are not; a real coupling stays."""
+    mix = np.array([[1.0, 1.0], [1.0, -1.0]])
+    recording = machine(0.0, mix=mix)
     assert not of(recording).suffice
-    found = of(recording, "corexy")
-    assert found.axes == ("x", "y") and found.suffice, found.sentence
+    found = of(recording, combine)
+    assert found.axes == axes and found.suffice, found.sentence
+    assert float(np.median(of(machine(0.2, mix=mix), combine).coupling)) == pytest.approx(0.2, rel=0.5)
 
 
 def test_inputs_that_are_alike_are_refused() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,9 @@ RATE, GAIN, CONSTANT, DELAY, FRICTION = 200.0, 0.5, 0.12, 0.013, 0.8
 FINE = 50  # steps of the machine in a sample
 
 
-def moved(u: FloatArray, friction: float = FRICTION, seed: int = 1) -> Run:
+def moved(u: FloatArray, friction: float = FRICTION, seed: int = 1, delay: float = DELAY) -> Run:
     """A first-order axis with friction, by Euler steps, and tachometer noise."""
-    late, v, speeds = int(DELAY * RATE * FINE), 0.0, []
+    late, v, speeds = int(delay * RATE * FINE), 0.0, []
     held = np.concatenate((np.full(late, u[0]), np.repeat(u, FINE)))
     for n in range(len(u)):
         speeds.append(v)
@@ -35,11 +36,11 @@ def moved(u: FloatArray, friction: float = FRICTION, seed: int = 1) -> Run:
     return Run("x", RATE, u, position, output_unit="rad", measured="velocity")
 
 
-def both_ways() -> list[Run]:
+def both_ways(delay: float = DELAY) -> list[Run]:
     """Ramp and step, both ways, as robot builders do it: four short recordings."""
     ramp = np.linspace(0.0, 6.0, 600)
     step = np.concatenate((np.zeros(20), np.full(160, 5.0)))
-    return [moved(u, seed=k) for k, u in enumerate((ramp, -ramp, step, -step))]
+    return [moved(u, seed=k, delay=delay) for k, u in enumerate((ramp, -ramp, step, -step))]
 
 
 def test_ramps_and_steps_both_ways_tell_friction_gain_and_time_constant() -> None:
@@ -51,6 +52,14 @@ def test_ramps_and_steps_both_ways_tell_friction_gain_and_time_constant() -> Non
     assert found["delay"].value == pytest.approx(DELAY, abs=0.001)
     assert found.explained > 0.99 and found["kV"].unit == "V/(rad/s)"
     assert "explains" in first_order_words(found)[0]
+
+
+def test_a_delay_that_ends_at_zero_hides_no_friction() -> None:
+    """A command that is logged a sample late seems to follow the motion: a parameter at its bound is judged like any other."""
+    late = [replace(run, voltage=np.concatenate((run.voltage[:1], run.voltage[:-1]))) for run in both_ways(delay=0.0)]
+    found = first_order(late)
+    assert found["delay"].value < 1e-9 and found["delay"].high < 0.01
+    assert found["friction"].value == pytest.approx(FRICTION, rel=0.04) and found["time_constant"].told
 
 
 def test_one_level_in_one_direction_does_not_tell_the_friction() -> None:
@@ -65,6 +74,15 @@ def test_a_level_that_ends_too_soon_is_extrapolated_and_that_is_said() -> None:
     """The step is shorter than the three time constants that a first order needs."""
     found = first_order([moved(np.concatenate((np.zeros(10), np.full(24, 5.0))), 0.0)])
     assert any("extrapolated" in sentence for sentence in first_order_words(found))
+
+
+def test_what_is_left_out_of_a_long_recording_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Samples after the first 20,000 are not used; here after the first 1000 of 1560."""
+    assert first_order(both_ways()).unused == 0.0
+    monkeypatch.setattr("xy_sysid.time_models.first_order.MOST", 1000)
+    found = first_order(both_ways())
+    assert found.unused == pytest.approx(560 / RATE)
+    assert any("The remaining 2.8 s of the data are not used" in sentence for sentence in first_order_words(found))
 
 
 def test_an_input_that_never_changes_is_refused() -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.cli_tools import cli
+from helpers.cli_tools import cli, refused
 from helpers.real_data import data
 
+from xy_sysid.axis.mechanics import robot_parameters
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Run
-from xy_sysid.time_models.as_words import robot_parameters, servo_words
+from xy_sysid.time_models.as_words import servo_words
 from xy_sysid.time_models.servo import servo
+from xy_sysid.units import Units
 
 RATE, STIFFNESS, DAMPING, FRICTION, LIMIT, DELAY = 100.0, 900.0, 40.0, 4.0, 60.0, 0.025
 
@@ -56,9 +58,23 @@ def test_what_target_and_angle_cannot_tell_is_said(runs: list[Run]) -> None:
     found = servo(runs)
     assert any("determine only ratios to the inertia" in text for text in servo_words(found, None))
     assert any("derivative gain" in text for text in servo_words(found, 0.01))
-    known = {item.name: item for item in robot_parameters(found, 0.01)}
+    known = {item.name: item for item in robot_parameters(found.quantities, found.units, 0.01)}
     assert set(known) == {"armature", "kp", "damping", "frictionloss", "forcerange"}
     assert known["kp"].value == pytest.approx(9.0, rel=0.1) and known["kp"].unit == "N m/rad"
+
+
+def test_a_gear_gives_the_numbers_of_the_motor(runs: list[Run]) -> None:
+    """MuJoCo's actuator with gear 50: torques smaller by 50, stiffness, damping and inertia by 2500; a linear servo in kg, N/m and N."""
+    found = servo(runs)
+    known = {item.name: item for item in robot_parameters(found.quantities, found.units, 0.01, "50")}
+    for name, power in (("armature", 2), ("kp", 2), ("damping", 2), ("frictionloss", 1), ("forcerange", 1)):
+        assert known[name].at_motor == pytest.approx(known[name].value / 50**power) and known[name].motor_unit == known[name].unit
+    linear = {item.name: item for item in robot_parameters(found.quantities, Units("m", "m"), 3.0, "5mm")}
+    kp, limit = linear["kp"], linear["forcerange"]
+    assert (kp.unit, kp.motor_unit, limit.unit, limit.motor_unit, linear["armature"].unit) == ("N/m", "N m/rad", "N", "N m", "kg")
+    assert kp.value == pytest.approx(3.0 * STIFFNESS, rel=0.1) and kp.at_motor == pytest.approx(kp.value * (5e-3 / (2 * np.pi)) ** 2)
+    with pytest.raises(BadInput, match="one in rad or m"):
+        robot_parameters(found.quantities, Units("counts", "counts"), 0.01)
 
 
 def test_a_limit_that_is_never_reached_is_not_told(runs: list[Run]) -> None:
@@ -78,6 +94,9 @@ def test_a_voltage_is_no_target(runs: list[Run]) -> None:
 def test_96_short_recordings_of_a_hobby_servo_are_used_together() -> None:
     """Each has at most 150 samples; the simulation from the target alone explains most of the held-out data."""
     said = ("--map", "input=data[*].actions,output=data[*].sensor_data", "--rate", "50", "--unit", "input=rad,output=rad", "--json")
-    found = cli("servo", data("servo_target/response.json"), *said, "--inertia", "0.002").json["axes"]["x"]
+    found = cli("servo", data("servo_target/response.json"), *said, "--inertia", "0.002", "--gear", "50").json["axes"]["x"]
     assert found["recordings"] > 60 and found["explained"] > 0.95
+    kp = found["quantities"]["kp"]
+    assert kp["at_motor"] == {"value": pytest.approx(kp["value"] / 2500), "unit": "N m/rad"}
+    assert "give --inertia, too" in refused("servo", data("servo_target/chirp0.csv"), "--gear", "50")
     assert found["quantities"]["delay"]["value"] == pytest.approx(0.044, abs=0.004) and found["quantities"]["kp"]["unit"] == "N m/rad"

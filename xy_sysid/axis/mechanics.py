@@ -112,8 +112,35 @@ def mechanics(figures: Iterable[Figure], units: Units, drive: Transmission) -> t
     for item in known.values():
         if item.unit == units.input:
             low, high = sorted((factor * item.low, factor * item.high))
-            found.append(_mechanical(item.name, (factor * item.value, low, high), force, drive, 1))
+            found.append(at_both(item.name, (factor * item.value, low, high), force, drive, 1))
     return tuple(found)
+
+
+def robot_parameters(figures: Iterable[Figure], units: Units, inertia: float, gear: str = "") -> tuple[Mechanical, ...]:
+    """A servo in the names and units of MuJoCo (position actuator and joint) and URDF (dynamics, limit), at the joint and at the motor.
+
+    figures: stiffness, damping, friction and limit over the inertia; inertia: of the joint with its load, kg m^2, or mass, kg
+    gear:    as for ``drive_from``. Raises BadInput for one that cannot be, and for angles in counts.
+    """
+    linear, drive = units.output == "m", drive_from(None, gear, units)
+    if not inertia > 0.0:
+        raise BadInput("inertia", f"{inertia:g} kg m^2", "more than 0", "Give that of the joint with its load.")
+    if not linear and units.output != "rad":
+        raise BadInput("inertia", f"of a joint in {units.output}", "one in rad or m", "Convert target and position, with --scale and --unit.")
+    force, mass, per = ("N", "kg", "m") if linear else ("N m", "kg m^2", "rad")
+    names = {
+        "stiffness": ("kp", f"{force}/{per}", 2),
+        "damping": ("damping", f"{force} s/{per}", 2),
+        "friction": ("frictionloss", force, 1),
+        "limit": ("forcerange", force, 1),
+    }
+    rows = [
+        at_both(name, (inertia * item.value, inertia * item.low, inertia * item.high), unit, drive, power)
+        for item in figures
+        if item.name in names
+        for name, unit, power in (names[item.name],)
+    ]
+    return (at_both("armature", (inertia, inertia, inertia), mass, drive, 2), *rows)
 
 
 def _factor(units: Units, drive: Transmission) -> float | None:
@@ -136,13 +163,17 @@ def _spread(item: Figure) -> float:
 
 def _both(name: str, value: float, wide: float, unit: str, drive: Transmission, power: int) -> Mechanical:
     factor = math.exp(wide) if wide < 700.0 else math.inf
-    return _mechanical(name, (value, value / factor, value * factor), unit, drive, power)
+    return at_both(name, (value, value / factor, value * factor), unit, drive, power)
 
 
-def _mechanical(name: str, figures: tuple[float, float, float], unit: str, drive: Transmission, power: int) -> Mechanical:
+def at_both(name: str, figures: tuple[float, float, float], unit: str, drive: Transmission, power: int) -> Mechanical:
+    """A number at the joint or table, its value at the motor being smaller by a power of the ratio: 1 for torques, 2 for inertia and damping.
+
+    figures: value and both ends of its interval
+    """
     value, low, high = figures
     at_motor = None if drive.ratio is None else value / drive.ratio**power
-    turned = {"kg": "kg m^2", "N": "N m", "N s/m": "N m s/rad"}.get(unit, unit)
+    turned = {"kg": "kg m^2", "N": "N m", "N s/m": "N m s/rad", "N/m": "N m/rad"}.get(unit, unit)
     return Mechanical(
         name=name,
         value=value,

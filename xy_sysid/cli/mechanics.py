@@ -29,24 +29,27 @@ def mechanics_table(figures: Iterable[Figure], units: Units, drive: Transmission
     if not found:
         return
     geared = drive.ratio is not None
-    rows = []
-    for item in found:
-        name, value, interval, unit = estimate(item.name, (item.value, item.low, item.high), item.unit)
-        motor = (f"{item.at_motor:.4g} {item.motor_unit}",) if geared and item.at_motor is not None else ()
-        rows.append((name, value, interval, unit, *motor, item.robot_name))
+    rows = [(*mechanics_cells(item), item.robot_name) for item in found]
     where = "the table" if units.output == "m" else "the joint"
     columns = ("parameter", "value", "95 % interval", "unit", *(("at the motor",) if geared else ()), "MuJoCo, URDF")
     table(f"in SI{f', at {where}' if geared else ''}", columns, rows)
+
+
+def mechanics_cells(item: Mechanical) -> tuple[str, ...]:
+    """Name, value, interval and unit; with a gear also the value at the motor."""
+    motor = () if item.at_motor is None else (f"{item.at_motor:.4g} {item.motor_unit}",)
+    return (*estimate(item.name, (item.value, item.low, item.high), item.unit), *motor)
 
 
 def mechanics_document(figures: Iterable[Figure], units: Units, drive: Transmission) -> dict[str, Any]:
     """The same for JSON."""
     from xy_sysid.axis.mechanics import mechanics
 
-    return {item.name: _row(item) for item in mechanics(figures, units, drive)}
+    return {item.name: mechanics_row(item) for item in mechanics(figures, units, drive)}
 
 
-def _row(item: Mechanical) -> dict[str, Any]:
+def mechanics_row(item: Mechanical) -> dict[str, Any]:
+    """One of them."""
     return {
         "value": item.value,
         "ci95": [item.low, item.high],

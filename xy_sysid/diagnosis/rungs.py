@@ -12,7 +12,7 @@ from xy_sysid.diagnosis.equal_laws import is_the_same, likely_names
 from xy_sysid.diagnosis.sets import contains, is_mistaken_for, part_explained
 from xy_sysid.effects import Effect
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joined, screened
+from xy_sysid.greybox.free_run import GreyboxFit, best_start, fit, fit_base, joined, never_worse, screened
 from xy_sysid.greybox.one_step import one_step_effect, one_step_fit
 from xy_sysid.hypotheses import starts
 from xy_sysid.hypotheses.companions import add_companion
@@ -33,8 +33,8 @@ def rungs_of(data: AxisData, library: Library, names: Sequence[str] = ()) -> tup
 def with_one_more(data: AxisData, library: Library, base: GreyboxFit, now: GreyboxFit, name: str) -> GreyboxFit:
     """A fit with one more effect, unasked; a relative of the same family gives way.
 
-    base: the rigid model. Where other effects were added before, the fit also starts from what the new effect makes of the base alone, so that the
-    order in which effects are added matters little.
+    It never fits worse than ``now``, unless a relative gave way. base: the rigid model. Where other effects were added before, the fit also starts
+    from what the new effect makes of the base alone, so that the order in which effects are added matters little.
     """
     effect = library[name]
     relative = next((own for own, _ in now.model.effects if effect.family and library[own].family == effect.family), None)
@@ -48,7 +48,8 @@ def with_one_more(data: AxisData, library: Library, base: GreyboxFit, now: Greyb
     if any(own not in base.model for own, _ in model.effects):
         alone = fit(data, best_start(data, _added(data, base, base.model, effect)), screening=True)
         start_models += starts.merged(model, alone.model)
-    return fit(data, best_start(data, start_models))
+    found = fit(data, best_start(data, start_models))
+    return found if relative is not None else never_worse(data, now, found)
 
 
 def _added(data: AxisData, now: GreyboxFit, model: AxisModel, effect: Effect) -> list[AxisModel]:

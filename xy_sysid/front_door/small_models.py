@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
-from xy_sysid.axis.mechanics import Figure, drive_from
+from xy_sysid.axis.mechanics import Figure, drive_from, robot_parameters
 from xy_sysid.axis.mechanics import mechanics as mechanical
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.diagnosis.answer import Answer
@@ -17,7 +17,7 @@ from xy_sysid.response.coupling import Coupling
 from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import IdentifierSettings, build
 from xy_sysid.tables import Table
-from xy_sysid.time_models.as_words import first_order_words, robot_parameters, servo_words
+from xy_sysid.time_models.as_words import first_order_words, servo_words
 from xy_sysid.time_models.first_order import FirstOrder, first_order
 from xy_sysid.time_models.output_error import told_table
 from xy_sysid.time_models.servo import Servo
@@ -63,11 +63,14 @@ class ServoTest(Servo):
         """Each quantity, divided by the inertia, with its 95 % interval."""
         return told_table(self.quantities)
 
-    def in_si(self, inertia: float) -> Table:
-        """Armature, kp, damping, frictionloss and forcerange, as MuJoCo calls them, for an inertia of joint and load, kg m^2."""
-        if not inertia > 0.0:
-            raise BadInput("inertia", f"{inertia:g} kg m^2", "more than 0", "Give that of the joint with its load.")
-        return told_table(robot_parameters(self, inertia))
+    def in_si(self, inertia: float, gear: str = "") -> Table:
+        """Armature, kp, damping, frictionloss and forcerange, as MuJoCo calls them, for an inertia of joint and load, kg m^2 (mass, kg).
+
+        gear: motor turns per joint turn ("50"), or travel per motor turn ("5mm"), for the values at the motor. Raises BadInput
+        """
+        columns = ("parameter", "value", "from", "to", "unit", "at the motor", "unit at the motor")
+        found = robot_parameters(self.quantities, self.units, inertia, gear)
+        return Table(columns, tuple((q.name, q.value, q.low, q.high, q.unit, q.at_motor, q.motor_unit if gear else "") for q in found))
 
     def __str__(self) -> str:
         """The sentences and the table."""

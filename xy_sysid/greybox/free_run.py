@@ -135,10 +135,15 @@ def fit_with(
         else:
             model = model.with_effect(name, bounded(model.library[name], values, data.similar))
     found = fit(data, model, screening, give_up_above)
-    if screening or fitted_score(data, found) <= fitted_score(data, base):
+    return found if screening else never_worse(data, base, found)
+
+
+def never_worse(data: AxisData, base: GreyboxFit, found: GreyboxFit) -> GreyboxFit:
+    """A fit with more effects than ``base``; if it is worse, the better of it and one from ``base`` with nearly absent new effects."""
+    if fitted_score(data, found) <= fitted_score(data, base):
         return found
     absent = base.model
-    for name, values in model.effects:
+    for name, values in found.model.effects:
         if name not in absent:
             least = absent.library[name].parameters[0].low if absent.library[name].parameters[0].positive else 0.0
             absent = absent.with_effect(name, bounded(absent.library[name], (least, *values[1:]), data.similar))

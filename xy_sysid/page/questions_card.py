@@ -28,7 +28,12 @@ class Question:
 
 QUESTIONS = (
     Question("steps", "Step test", "Short step and ramp tests: gain, time constant, delay and friction (kS, kV, kA).", ("--kt", "--gear")),
-    Question("servo", "Servo", "A position-controlled joint, target to angle: stiffness, damping, friction, torque limit and delay.", ("--inertia",)),
+    Question(
+        "servo",
+        "Servo",
+        "A position-controlled joint, target to angle: stiffness, damping, friction, torque limit and delay.",
+        ("--inertia", "--gear"),
+    ),
     Question("diagnose", "What is missing, in SI", "Inertia or mass and friction in SI: give the torque constant of a current.", ("--kt", "--gear")),
     Question("frf", "Response", "The frequency response as a table, with remarks."),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from xy_sysid.time_models.first_order import FirstOrder
+from xy_sysid.time_models.first_order import MOST, FirstOrder
 from xy_sysid.time_models.output_error import Told
 from xy_sysid.time_models.servo import Servo
 from xy_sysid.units import moved
@@ -25,6 +25,8 @@ def first_order_words(found: FirstOrder) -> tuple[str, ...]:
             f"A first order with delay does not describe this: it explains {share} of the speed and leaves {left} rms. "
             "Use fit or diagnose on a record with noise or a multisine."
         ]
+    if found.unused > 0.0:
+        said.append(f"The remaining {found.unused:.3g} s of the data are not used ({MOST:,} samples at most). Choose another part with --span.")
     constant, delay = found["time_constant"], found["delay"]
     if found.levels < 3 and "friction" not in found.terms and not found.both_ways:
         if "offset" in found.terms:
@@ -88,18 +90,6 @@ def servo_words(found: Servo, inertia: float | None) -> tuple[str, ...]:
         "power, moved by hand, shows its own damping."
     )
     return tuple(said)
-
-
-def robot_parameters(found: Servo, inertia: float) -> tuple[Told, ...]:
-    """The servo in the names and units of MuJoCo (position actuator and joint) and URDF (dynamics, limit), for an inertia in kg m^2."""
-    names = (("stiffness", "kp", "N m/rad"), ("damping", "damping", "N m s/rad"), ("friction", "frictionloss", "N m"), ("limit", "forcerange", "N m"))
-    known = {item.name: item for item in found.quantities}
-    rows = [
-        Told(name=name, value=inertia * known[own].value, low=inertia * known[own].low, high=inertia * known[own].high, unit=unit)
-        for own, name, unit in names
-        if own in known
-    ]
-    return (Told(name="armature", value=inertia, low=inertia, high=inertia, unit="kg m^2"), *rows)
 
 
 def _span(item: Told) -> str:

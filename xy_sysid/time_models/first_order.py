@@ -40,6 +40,7 @@ class FirstOrder:
     levels:      number of levels of the input; both_ways: True if it moves both ways; settled: duration of the longest level in time constants
     error:       rms of the residual error, in the speed's unit; explained: fraction of the speed's power about its mean
     repeats:     s for which the residual is correlated: more than a few samples is not noise; seconds: of the recordings that were used
+    unused:      s of the recordings after those
     longest_delay: largest tested delay, s; an interval that reaches it determines nothing
     measured, simulated: (n,) speeds of all recordings
     """
@@ -55,6 +56,7 @@ class FirstOrder:
     repeats: float
     longest_delay: float
     seconds: float
+    unused: float
     terms: tuple[Term, ...]
     measured: FloatArray
     simulated: FloatArray
@@ -69,7 +71,7 @@ def first_order(runs: Sequence[Run]) -> FirstOrder:
     if not runs:
         raise BadInput("runs", "none", "one or more", "Give at least one.")
     rate, units = runs[0].sampling_rate, runs[0].units
-    runs = _shortened(runs)
+    given, runs = sum(map(len, runs)), _shortened(runs)
     inputs, speeds = zip(*(_speed(run) for run in runs), strict=True)
     if sum(map(len, speeds)) < FEWEST:
         raise BadInput("number of samples", sum(map(len, speeds)), f"{FEWEST} or more", "Record for longer, or faster.")
@@ -78,11 +80,11 @@ def first_order(runs: Sequence[Run]) -> FirstOrder:
     measured = np.concatenate(speeds)
     if float(np.ptp(measured)) == 0.0:
         raise BadInput("output", "one and the same", "a motion", "Excite more, or check the sensor.")
-    both = bool(measured.min() < -TURNED * np.abs(measured).max() and measured.max() > TURNED * np.abs(measured).max())
-    sets: list[tuple[Term, ...]] = [("friction", "load"), ("friction",), ("load",), ()] if both else [("offset",), ()]
+    sets: list[tuple[Term, ...]] = [("friction", "load"), ("friction",), ("load",), ()] if _both_ways(measured) else [("offset",), ()]
     found = [_fitted(rate, inputs, speeds, terms) for terms in sets]
     best = shortest(found)
-    return _answer(rate, units, inputs, (sets[best], found[best]), measured, both)
+    unused = (given - sum(map(len, runs))) / rate
+    return _answer(rate, units, inputs, (sets[best], found[best]), measured, unused)
 
 
 def _shortened(runs: Sequence[Run]) -> list[Run]:
@@ -101,6 +103,12 @@ def _speed(run: Run) -> tuple[FloatArray, FloatArray]:
         raise BadInput("output", "an acceleration", "a position or a velocity", "Use fit, which models it as it is.")
     speed = np.diff(run.position) * run.sampling_rate
     return run.voltage[: speed.size], speed
+
+
+def _both_ways(measured: FloatArray) -> bool:
+    """True if the speed has both directions."""
+    least = TURNED * np.abs(measured).max()
+    return bool(measured.min() < -least and measured.max() > least)
 
 
 def _fitted(rate: float, inputs: Sequence[FloatArray], speeds: Sequence[FloatArray], terms: tuple[Term, ...]) -> Minimized:
@@ -168,7 +176,7 @@ def _lagged(values: FloatArray, keep: float) -> FloatArray:
 
 
 def _answer(
-    rate: float, units: Units, inputs: Sequence[FloatArray], found: tuple[tuple[Term, ...], Minimized], measured: FloatArray, both: bool
+    rate: float, units: Units, inputs: Sequence[FloatArray], found: tuple[tuple[Term, ...], Minimized], measured: FloatArray, unused: float
 ) -> FirstOrder:
     terms, best = found
     gain, constant = float(best.values[0]), float(best.values[1])
@@ -191,12 +199,13 @@ def _answer(
         units=units,
         sampling_rate=rate,
         levels=levels,
-        both_ways=both,
+        both_ways=_both_ways(measured),
         settled=lasting / rate / constant,
         error=best.cost,
         explained=explained,
         longest_delay=_longest(rate, inputs),
         seconds=measured.size / rate,
+        unused=unused,
         repeats=best.error.size / best.independent / rate,
         terms=terms,
         measured=measured,

@@ -18,6 +18,7 @@ from xy_sysid.tables import Table
 
 FORGOTTEN = 0.1  # autocorrelation below which an error counts as uncorrelated
 FLAT = 1e-5  # singular value of the scaled Jacobian, relative to the largest, below which the data do not determine a direction
+STEP = 1e-5  # of a value or of its start, for derivatives
 FURTHEST = 0.2  # of a record: longer lags cannot be estimated
 
 Simulate = Callable[[FloatArray], FloatArray]
@@ -112,11 +113,14 @@ def solved(
             found = measured - simulate(values)
         return np.nan_to_num(found, nan=1e6, posinf=1e6, neginf=-1e6)
 
+    def slope(values: FloatArray) -> FloatArray:
+        """(n, p) derivatives, by steps into the bounds that do not vanish with the value: a parameter that ends at 0 is still judged."""
+        here, steps = error(values), STEP * np.maximum(np.abs(values), scale)
+        steps = np.where(values + steps > high, -steps, steps)
+        return np.column_stack([(error(values + row) - here) / step for row, step in zip(np.diag(steps), steps, strict=True)])
+
     found = [
-        scipy.optimize.least_squares(
-            error, np.clip(start, low, high), bounds=(low, high), x_scale=scale, diff_step=np.full(scale.size, 1e-5), max_nfev=60
-        )
-        for start in starts
+        scipy.optimize.least_squares(error, np.clip(start, low, high), slope, bounds=(low, high), x_scale=scale, max_nfev=60) for start in starts
     ]
     best = min(found, key=lambda item: float(item.cost))
     return _judged(np.asarray(best.x), np.asarray(best.fun), -np.asarray(best.jac), sizes)
