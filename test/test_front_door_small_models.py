@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 import pytest
+from helpers.cli_tools import cli, refused
 from scipy import signal
 
 import xy_sysid as xy
@@ -45,6 +46,27 @@ def test_a_current_moves_a_table_through_a_screw() -> None:
     assert damping[1] == pytest.approx(0.12 * screw / 0.5e-2, rel=0.02) and (damping[4], damping[6]) == ("N s/m", "N m s/rad")
     with pytest.raises(xy.BadInput, match="the way of one turn with its unit"):
         xy.mechanics(found, kt=0.12, gear="50")
+
+
+@pytest.mark.parametrize("measured", ["rad", "rad/s"])
+def test_a_transfer_function_of_a_current_gives_inertia_and_damping(tmp_path: Path, measured: str) -> None:
+    """At the joint and at the motor, with the names of MuJoCo and URDF, from Python and from the command; without a torque constant nothing."""
+    rng = np.random.default_rng(2)
+    u = rng.normal(0.0, 1.0, 12_000)
+    joint = signal.cont2discrete(([0.5], [0.1, 1.0] if measured == "rad/s" else [0.1, 1.0, 0.0]), 1.0 / RATE)
+    y = signal.lfilter(np.ravel(joint[0]), joint[1], u) + rng.normal(0.0, 1e-5, u.size)
+    np.savetxt(tmp_path / "joint.csv", np.column_stack((np.arange(u.size) / RATE, u, y)), "%.12g", ",", header="time,current,out", comments="")
+    columns, units = {"input": "current", "output": "out"}, {"input": "A", "output": measured}
+    found = xy.fit(xy.load(tmp_path / "joint.csv", columns=columns, units=units).run("x"))
+    rows = {str(row[0]): row for row in xy.mechanics(found, kt=0.12, gear="10")}
+    assert rows["inertia"][1] == pytest.approx(0.12 * 10.0 * 0.1 / 0.5, rel=0.05) and rows["inertia"][2] < 0.24 < rows["inertia"][3]
+    assert rows["damping"][5] == pytest.approx(0.12 / 0.5 / 10.0, rel=0.05) and rows["inertia"][7] == "armature"
+    assert len(xy.mechanics(found)) == 0
+    words = ("fit", tmp_path / "joint.csv", "--map", "input=current,output=out", "--unit", "input=A", "--unit", f"output={measured}")
+    told = cli(*words, "--kt", "0.12", "--gear", "10", "--json").json["axes"]["x"]["mechanics"]
+    assert told["inertia"]["value"] == pytest.approx(0.24, rel=0.05) and told["inertia"]["at_motor"]["unit"] == "kg m^2"
+    assert "in SI, at the joint" in cli(*words, "--kt", "0.12", "--gear", "10").out
+    assert refused(*words, "--kt", "-1").startswith("xy-sysid: --kt is -1")
 
 
 def test_a_servo_gives_its_stiffness_and_the_numbers_of_mujoco(tmp_path: Path) -> None:

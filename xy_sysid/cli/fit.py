@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from xy_sysid.cli import options as o
+from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
 from xy_sysid.cli.output import aside, emit, estimates, say, say_refused
 from xy_sysid.cli.reading import chosen, each, measured_responses, named, read, reads
 from xy_sysid.files.provenance import provenance, provenance_of_response
@@ -38,10 +39,13 @@ def fit(
     averages: Annotated[
         float | None, typer.Option("--averages", min=2.0, help="independent windows behind the coherence of a measured response")
     ] = None,
+    kt: Kt = None,
+    gear: Gear = "",
     force: o.Force = False,
     json: o.Json = False,
 ) -> None:
     """Fit a transfer function with delay to each axis, with 95 % intervals and checks. REC may also be a measured frequency response."""
+    from xy_sysid.axis.mechanics import drive_from
     from xy_sysid.errors import BadInput
     from xy_sysid.files import linear_models
     from xy_sysid.fitting.of_given_response import band_of
@@ -79,16 +83,20 @@ def fit(
         done, problems = each(chosen(recording, reading.axes), work)
         origin = provenance(named(recs), recording)
     fits = {name: result for name, (_, result, _) in done.items()}
+    drives = {name: drive_from(kt, gear, result.units) for name, result in fits.items()}
     if model is not None:
         linear_models.write_model(model, fits, origin)
     if mat is not None:
         linear_models.write_mat(mat, fits)
     if json:
-        answers = {name: answer(*parts) for name, parts in done.items()} | {name: {"problem": text} for name, text in problems.items()}
+        answers: dict[str, Any] = {name: {"problem": text} for name, text in problems.items()}
+        for name, parts in done.items():
+            answers[name] = answer(*parts) | {"mechanics": mechanics_document(fits[name].rigid, fits[name].units, drives[name])}
         emit({"recording": origin, "axes": answers})
         return
-    for parts in done.values():
+    for name, parts in done.items():
         _show(*parts)
+        mechanics_table(fits[name].rigid, fits[name].units, drives[name])
     say_refused(problems, "no model. ")
 
 

@@ -10,6 +10,7 @@ from xy_sysid.fitting.structure import Structure
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.units import Units, position_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +114,17 @@ class Fit:
             )
             for item in self.intervals
         )
+
+    @property
+    def units(self) -> Units:
+        """Of the input and of the position, whichever of its derivatives was measured."""
+        return Units(self.tf.input_unit, position_of(self.tf.output_unit))
+
+    @property
+    def rigid(self) -> tuple[Interval, ...]:
+        """Gain and pole of the rigid body, from which inertia and damping follow; none if the gain is not that of a velocity."""
+        ours = tuple(item for item in self.intervals_with_misfit if item.name in ("gain", "pole_1"))
+        return ours if any(item.name == "gain" and item.unit == self.units.of("m/s/V") for item in ours) else ()
 
     def interval(self, name: str) -> Interval:
         """The estimate of that name; raises BadInput if there is none."""

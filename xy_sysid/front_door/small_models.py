@@ -12,6 +12,7 @@ from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.diagnosis.of_run import Data, runs_together
 from xy_sysid.errors import BadInput
+from xy_sysid.fitting.of_run import LinearModel
 from xy_sysid.fitting.two_axes import coupling_in
 from xy_sysid.response.coupling import Coupling
 from xy_sysid.samples.recording import Recording, Run
@@ -22,7 +23,7 @@ from xy_sysid.time_models.first_order import FirstOrder, first_order
 from xy_sysid.time_models.output_error import told_table
 from xy_sysid.time_models.servo import Servo
 from xy_sysid.time_models.servo import servo as servo_of
-from xy_sysid.units import Units
+from xy_sysid.units import USUAL, Units
 
 
 class StepTest(FirstOrder):
@@ -108,10 +109,10 @@ def coupling(data: Recording, combine: str = "", **settings: Any) -> Coupling:
     return coupling_in(data, build(IdentifierSettings, settings, "coupling"), combine)
 
 
-def mechanics(found: FirstOrder | PhysicalModel | Answer, kt: float | None = None, gear: str = "") -> Table:
+def mechanics(found: FirstOrder | LinearModel | PhysicalModel | Answer, kt: float | None = None, gear: str = "") -> Table:
     """Inertia or mass, damping and friction in SI, at the joint or table and at the motor, with the names of MuJoCo and URDF.
 
-    found: result of ``steps``, ``refine`` or ``diagnose``, or a model; kt: torque constant, N m/A, if the input is a current
+    found: result of ``steps``, ``fit``, ``refine`` or ``diagnose``, or a model; kt: torque constant, N m/A, if the input is a current
     gear:  motor turns per joint turn ("50"), or travel per motor turn ("5mm")
     Empty if the input is not a torque, a force, or a current with a known torque constant. Raises BadInput for a gear that cannot be read.
     """
@@ -125,12 +126,14 @@ def mechanics(found: FirstOrder | PhysicalModel | Answer, kt: float | None = Non
     return Table(columns, tuple(rows))
 
 
-def _figures(found: FirstOrder | PhysicalModel | Answer) -> tuple[tuple[Figure, ...], Units]:
+def _figures(found: FirstOrder | LinearModel | PhysicalModel | Answer) -> tuple[tuple[Figure, ...], Units]:
     """Parameters with intervals, and their units."""
     if isinstance(found, FirstOrder):
         return found.quantities, found.units
     if isinstance(found, Answer):
         return found.rungs[-1].parameters if found.rungs else (), found.units
+    if isinstance(found, LinearModel):
+        return (found.fit.rigid, found.fit.units) if found.fit is not None else ((), USUAL)
     return found.parameters, found.units
 
 
