@@ -87,6 +87,8 @@ def test_a_robot_that_takes_only_trajectories_is_identified_and_stopped(world: W
     """
     from std_msgs.msg import Bool
 
+    from xy_sysid.nodes.common import LATCHED_QOS
+
     control = controller(world, load=0.1)
     short = {"length": 512, "band_low": 1.0}
     start(world, "identifier", numerator_order=0, denominator_order=2, **short)
@@ -115,8 +117,7 @@ def test_a_robot_that_takes_only_trajectories_is_identified_and_stopped(world: W
         return bool(used.any()) and bool(np.median(np.abs(np.abs(measured) - np.abs(closed))) < 0.1)
 
     assert world.until(is_the_loop, 60.0), whole and whole[-1]
-    stop = world.node.create_publisher(Bool, "stop", 1)
-    assert world.until(lambda: stop.get_subscription_count() > 0)
+    stop = world.node.create_publisher(Bool, "stop", LATCHED_QOS)  # whoever subscribes hears it, however late it is discovered
     stop.publish(Bool(data=True))
     assert world.until(lambda: world.state("excitation") == "inactive", 20.0), drive.output()
     assert "STOP is on" in drive.output()
