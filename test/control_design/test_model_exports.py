@@ -204,6 +204,12 @@ def test_mujoco_says_each_force_of_an_axis_that_is_wired_backwards(effect: str) 
     assert not mjcf(model, RATE).lost and speeds_apart(model, noise(1000)) < 0.01
 
 
+def test_an_mjcf_file_says_its_units_and_how_long_an_input_is_held() -> None:
+    """A mass of 0.04 is no kilogram: the comment names the unit, and the steps to a sample of the input."""
+    made = mjcf(axis("coulomb_friction"), RATE)
+    assert f"forces are in the unit of the input: the mass is kA, the damping kV; hold each input for {made.steps} steps, 1/2000 s -->" in made.text
+
+
 def test_an_axis_in_radians_turns_in_mujoco() -> None:
     """A rotary axis has only hinges, also behind a resonance; an axis in metres has slides."""
     for output, kind in (("rad", mujoco.mjtJoint.mjJNT_HINGE), ("m", mujoco.mjtJoint.mjJNT_SLIDE)):
@@ -211,18 +217,19 @@ def test_an_axis_in_radians_turns_in_mujoco() -> None:
         assert mujoco.MjModel.from_xml_string(text).jnt_type.tolist() == [kind, kind], output
 
 
-@pytest.mark.parametrize("effect", ["coulomb_friction=0.3", "cogging=0.2", "presliding_hysteresis=0.3"])
+@pytest.mark.parametrize("effect", ["coulomb_friction=0.3", "presliding_hysteresis=0.3", "cogging=0.2", "coulomb_friction=0.3+cogging=0.2"])
 def test_the_circle_through_mujoco_closes(effect: str) -> None:
-    """With a recorded input, MuJoCo's held-out error is at most 1.05 times ours; its motion shows the effect."""
+    """With a recorded input, MuJoCo's held-out error is at most 1.05 times ours; its motion shows the effects, and no other."""
+    names = tuple(word.partition("=")[0] for word in effect.split("+"))
     run, judge = recorded(effect, 10.0).run("x"), recorded(effect, 3.0, seed=99).run("x")
-    model = xy.refine(run, add=[effect.partition("=")[0]], auto=False).model.model
+    model = xy.refine(run, add=names, auto=False).model.model
     measured = np.diff(judge.position)
     ours, theirs = (np.diff(position) for position in (simulate_alone(model, RATE, judge.voltage), in_mujoco(mjcf(model, RATE), judge.voltage)))
     error, other = (float(np.sqrt(np.mean((moved - measured) ** 2))) for moved in (ours, theirs))
     assert other <= 1.05 * error
     shown = in_mujoco(mjcf(model, RATE), run.voltage) + 1e-7 * np.random.default_rng(1).standard_normal(len(run))
     again = xy.diagnose(xy.Recording.from_arrays(RATE, run.voltage, np.round(shown / 5e-7) * 5e-7).run("x"))
-    assert again.effects == (effect.partition("=")[0],) and again.confidence > 0.9
+    assert again.effects == names and again.confidence > 0.9
 
 
 def test_a_urdf_is_parsed_by_mujoco_and_names_what_it_loses() -> None:

@@ -86,6 +86,7 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
     moving = f'<inertial pos="0 0 0" mass="{_num(mass)}" diaginertia="{_num(mass)} {_num(mass)} {_num(mass)}"/>'
     lines = [
         f'<mujoco model="{name}">',
+        f"  <!-- forces are in the unit of the input: the mass is kA, the damping kV; hold each input for {steps} steps, 1/{sampling_rate:g} s -->",
         *(f"  <!-- lost: {effect}: {why} -->" for effect, why in said.lost),
         f'  <option timestep="{step!r}" gravity="0 0 0" integrator="{integrator}"/>',
         "  <worldbody>",
