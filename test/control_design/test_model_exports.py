@@ -187,14 +187,23 @@ def speeds_apart(model: AxisModel, voltage: FloatArray) -> float:
 
 
 def test_mujoco_says_each_effect_or_names_it_as_lost() -> None:
-    """Effects that are not listed as lost move in MuJoCo as here, within 1 % of the motion, most within 0.3 %."""
+    """Effects that are not listed as lost move in MuJoCo as here, within 0.2 % of the motion, without dry friction within 0.02 %."""
     voltage = noise(1000)
     for names in [(), *((name,) for name in ALL)]:
         model = axis(*names)
         lost = {name for name, _ in mjcf(model, RATE).lost}
         assert lost == set(names) & (LOST | {"stribeck_friction"}), names
         if not lost:
-            assert speeds_apart(model, voltage) < 0.01, names
+            dry = any(STANDARD[name].category in ("friction", "bristle") for name in names)
+            assert speeds_apart(model, voltage) < (0.002 if dry else 0.0002), names
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.1e-3, 0.37e-3, 1.29e-3, 1.5e-3, 4.3e-3])
+@pytest.mark.parametrize("names", [(), ("coulomb_friction",), ("amplifier_lag",)])
+def test_mujoco_is_as_late_as_the_model(names: tuple[str, ...], delay: float) -> None:
+    """MuJoCo delays by whole steps, and its integrators are a part of a step early: 0.02 to 0.15 % of the motion are left, 0.4 % at whole samples."""
+    bound = 0.004 if delay in (0.0, 1.5e-3) else 0.0015 if "coulomb_friction" in names else 0.0006
+    assert speeds_apart(axis(*names, delay=delay), noise(1000)) < bound
 
 
 @pytest.mark.parametrize("effect", [effect.name for effect in STANDARD.acting if effect.category == "force" and effect.name not in LOST])
@@ -204,6 +213,12 @@ def test_mujoco_says_each_force_of_an_axis_that_is_wired_backwards(effect: str) 
     assert not mjcf(model, RATE).lost and speeds_apart(model, noise(1000)) < 0.01
 
 
+def test_an_mjcf_file_says_its_units_and_how_long_an_input_is_held() -> None:
+    """A mass of 0.04 is no kilogram: the comment names the unit, and the steps to a sample of the input."""
+    made = mjcf(axis("coulomb_friction"), RATE)
+    assert f"forces are in the unit of the input: the mass is kA, the damping kV; hold each input for {made.steps} steps, 1/2000 s -->" in made.text
+
+
 def test_an_axis_in_radians_turns_in_mujoco() -> None:
     """A rotary axis has only hinges, also behind a resonance; an axis in metres has slides."""
     for output, kind in (("rad", mujoco.mjtJoint.mjJNT_HINGE), ("m", mujoco.mjtJoint.mjJNT_SLIDE)):
@@ -211,18 +226,21 @@ def test_an_axis_in_radians_turns_in_mujoco() -> None:
         assert mujoco.MjModel.from_xml_string(text).jnt_type.tolist() == [kind, kind], output
 
 
-@pytest.mark.parametrize("effect", ["coulomb_friction=0.3", "cogging=0.2", "presliding_hysteresis=0.3"])
+@pytest.mark.parametrize(
+    "effect", ["coulomb_friction=0.3", "presliding_hysteresis=0.3", "cogging=0.2", "screw_compliance", "coulomb_friction=0.3+cogging=0.2"]
+)
 def test_the_circle_through_mujoco_closes(effect: str) -> None:
-    """With a recorded input, MuJoCo's held-out error is at most 1.05 times ours; its motion shows the effect."""
+    """With a recorded input, MuJoCo's held-out error is at most 1.05 times ours; its motion shows the effects, and no other."""
+    names = tuple(word.partition("=")[0] for word in effect.split("+"))
     run, judge = recorded(effect, 10.0).run("x"), recorded(effect, 3.0, seed=99).run("x")
-    model = xy.refine(run, add=[effect.partition("=")[0]], auto=False).model.model
+    model = xy.refine(run, add=names, auto=False).model.model
     measured = np.diff(judge.position)
     ours, theirs = (np.diff(position) for position in (simulate_alone(model, RATE, judge.voltage), in_mujoco(mjcf(model, RATE), judge.voltage)))
     error, other = (float(np.sqrt(np.mean((moved - measured) ** 2))) for moved in (ours, theirs))
     assert other <= 1.05 * error
     shown = in_mujoco(mjcf(model, RATE), run.voltage) + 1e-7 * np.random.default_rng(1).standard_normal(len(run))
     again = xy.diagnose(xy.Recording.from_arrays(RATE, run.voltage, np.round(shown / 5e-7) * 5e-7).run("x"))
-    assert again.effects == (effect.partition("=")[0],) and again.confidence > 0.9
+    assert again.effects == names and again.confidence > 0.9
 
 
 def test_a_urdf_is_parsed_by_mujoco_and_names_what_it_loses() -> None:

@@ -22,6 +22,7 @@ from helpers.known_models import GAIN, POLE, known, unknown
 from helpers.simulated import recorded
 
 import xy_sysid as xy
+from xy_sysid.control_design import snippets
 from xy_sysid.control_design.compensation import left_words
 from xy_sysid.control_design.exports import export
 from xy_sysid.control_design.gains import Gains
@@ -227,8 +228,28 @@ def test_a_klipper_snippet_of_another_axis_says_so() -> None:
     """Shapers exist for x and y only: any other axis is written as x, in the text and in the note."""
     made = export(use(replace(known("base_resonance"), axis="gantry")), "klipper")
     (text,) = made.files.values()
-    assert text.startswith("# of axis 'gantry', written as x\n[input_shaper]\n") and "the axis is 'gantry'" in made.note
+    assert text.startswith("# of axis 'gantry', written as x\n") and "\n[input_shaper]\n" in text and "the axis is 'gantry'" in made.note
     assert "written as" not in "".join(export(use(replace(known("base_resonance"), axis="y")), "klipper").files.values())
+
+
+@pytest.mark.parametrize("target", snippets.TARGETS)
+def test_a_pasted_file_says_itself_what_it_lacks(target: str) -> None:
+    """Who opens the file later has not seen the command's output: the whole note is in the file, as comments."""
+    units = Units("N m", "rad") if target == "odrive" else Units("V", "m")
+    used = use(known("coulomb_friction", "base_resonance", units=units), rate=1000.0, limit=5.0, travel=TRAVEL)
+    made = export(used, target)
+    (text,) = made.files.values()
+    comments = [line for line in text.splitlines() if line.startswith(("# ", "(* "))]
+    told = " ".join(line.removeprefix("# ").removeprefix("(* ").removesuffix(" *)") for line in comments)
+    assert made.note and made.note in told
+    if target in ("linuxcnc", "ros2_control"):
+        assert "kS" in told and f"{used.gains.value('kS'):.4g} V" in told
+
+
+def test_a_linuxcnc_file_names_the_component_that_it_needs() -> None:
+    """pid.x exists only after loadrt with this name; without it, each setp fails."""
+    (text,) = export(use(replace(known(), axis="z"), limit=5.0), "linuxcnc").files.values()
+    assert "loadrt pid names=pid.z\n" in text and "setp pid.z.Pgain" in text
 
 
 def test_an_odrive_snippet_is_python_in_turns() -> None:

@@ -108,7 +108,7 @@ def use(
                 for file, text in item.files.items():
                     say(f"--- {file}")
                     typer.echo(text, nl=False)
-            if item.note:
+            if item.note and not (item.commented and out is None):  # a printed file already says it
                 say(f"  {target}: {item.note}.")
     for text in written:
         say(f"wrote {text}", aside)

@@ -22,7 +22,7 @@ from xy_sysid.settings import unknown_name
 class Exported:
     """The output for a target.
 
-    files: text by name; note: effects that the target cannot represent, or how to use the text
+    files: text by name; note: effects that the target cannot represent, or how to use the text; commented: True if the files have it as a comment
     archive: the name of a functional mock-up unit into which the files are packed; mat: name of a .mat file -> its variables
     """
 
@@ -30,6 +30,7 @@ class Exported:
     note: str = ""
     archive: str = ""
     mat: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    commented: bool = False
 
 
 def tables(used: Used) -> Exported:
@@ -46,7 +47,7 @@ def _snippet(write: Callable[[snippets.Designed], snippets.Snippet]) -> Callable
     def made(used: Used) -> Exported:
         speed = used.fastest.bounds.speed if used.fastest is not None else None
         item = write(snippets.Designed(used.axis, used.model, used.gains, used.feedback, used.calculation, used.shaper, speed))
-        return Exported({f"{used.axis}_{item.target}_{item.file}": item.text}, item.note)
+        return Exported({f"{used.axis}_{item.target}_{item.file}": item.text}, item.note, commented=True)
 
     return made
 

@@ -22,7 +22,9 @@ from xy_sysid.samples.block import FloatArray
 SHORT = 1e-6  # m: deflection of bristles that approximate friction without presliding that falls with speed
 CRITICAL = 0.5  # damping of such bristles over the root of stiffness times mass: a damping ratio of 0.25
 TINY = 1e-9  # motor constant of a motor that has only friction or cogging
-RUBBING = 64_000.0  # Hz of the steps with dry friction: an error of 0.2 % of the motion, and 2 % at 16 kHz
+RUBBING = 64_000.0  # Hz of the steps with dry friction: an error of 0.13 % of the motion
+LEAD = {"RK4": 1.0 / 6.0, "implicitfast": 0.5}  # of a step, by which the motion is early: weight of RK4's last stage; Euler moves at the new speed
+CLEAR = 0.01  # of a step: so long before or after a step an input changes, so that rounding of the times does not matter
 EXACT = 1e-6  # of the largest force: tolerance within which a law counts as a sine or a polynomial
 
 
@@ -62,30 +64,31 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
     mass, drag, hung = _bodies(model, said)
     kind = 'type="hinge" axis="0 0 1"' if angular else 'type="slide" axis="1 0 0"'
     behind, tendon = _behind(hung, name, kind)
-    steps = _steps(model, sampling_rate, 2.0 * FINE if dry == 0.0 and lag is None else RUBBING)
+    integrator = "implicitfast" if dry else "RK4"
+    fine = 2.0 * FINE if dry == 0.0 and lag is None else RUBBING
+    steps, waits, side = _steps(model.delay * sampling_rate, sampling_rate, fine, LEAD[integrator])
     bend, spring = _spring(said.polynomial, turn)
     curve = f" {_num(said.square)} 0" if said.square else ""
     step = 1.0 / (sampling_rate * steps)
     drive = [f'name="drive" joint="{name}" gear="{turn:g}" gainprm="1" biastype="affine" biasprm="{_num(-bend)} 0 0"']
     if model.delay > 0.0:
-        whole = round(model.delay / step)
-        drive.append(f'delay="{_num(whole * step)}" nsample="{whole + 2}" interp="zoh"')  # MuJoCo delays by whole steps
+        drive.append(f'delay="{_num(max(waits + side * CLEAR, 0.0) * step)}" nsample="{waits + 2}" interp="zoh"')
     if lag is not None:
-        drive.append(f'dyntype="filterexact" dynprm="{_num(lag)}"')
+        exact = "" if integrator == "RK4" and lag > step else "exact"  # RK4 integrates the filter as all states; the exact step is for Euler
+        drive.append(f'dyntype="filter{exact}" dynprm="{_num(lag)}"')
     if limit < math.inf:
         drive.append(f'ctrllimited="true" ctrlrange="{_num(-limit)} {_num(limit)}"')
     quiet = f'joint="{name}" motorconst="{TINY}" resistance="1"'
     others = [f'<dcmotor name="{who}" {quiet} cogging="{_num(-turn * size)} {_num(wave)} {_num(phase)}"/>' for who, size, wave, phase in said.waves]
-    held, integrator = "", "RK4"
+    held = ""
     if isinstance(dry, tuple):
         others.append(f'<dcmotor name="friction" {quiet} lugre="{" ".join(map(_num, dry))}"/>')
-        integrator = "implicitfast"
     elif dry > 0.0:
         held = f' frictionloss="{_num(dry)}" solreffriction="{_num(2.0 * step)} 1" solimpfriction="0.9999 0.9999 1e-6"'
-        integrator = "implicitfast"
     moving = f'<inertial pos="0 0 0" mass="{_num(mass)}" diaginertia="{_num(mass)} {_num(mass)} {_num(mass)}"/>'
     lines = [
         f'<mujoco model="{name}">',
+        f"  <!-- forces are in the unit of the input: the mass is kA, the damping kV; hold each input for {steps} steps, 1/{sampling_rate:g} s -->",
         *(f"  <!-- lost: {effect}: {why} -->" for effect, why in said.lost),
         f'  <option timestep="{step!r}" gravity="0 0 0" integrator="{integrator}"/>',
         "  <worldbody>",
@@ -106,11 +109,21 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
     return Mjcf("\n".join(lines) + "\n", steps, tuple(said.lost))
 
 
-def _steps(model: AxisModel, sampling_rate: float, fine: float) -> int:
-    """Steps per sample, at least ``fine`` per second: up to 1.5 times the least, so that the delay is closest to an integer number of steps."""
+def _steps(late: float, sampling_rate: float, fine: float, lead: float) -> tuple[int, int, int]:
+    """Steps of a sample, at least ``fine`` per second; steps of the delay; and -1 if an input changes just before a step, 1 if just after it.
+
+    late: the delay in samples; lead: steps by which the motion is early with an input that changes just before a step, and late just after it
+    MuJoCo delays by whole steps. The count is up to 1.5 times the least, whichever meets the delay best.
+    """
     least = max(math.ceil(fine / sampling_rate), 1)
-    late = model.delay * sampling_rate
-    return min(range(least, least + max(least // 2, 1) + 1), key=lambda count: (round(abs(late * count - round(late * count)) / count, 6), count))
+
+    def off(of: tuple[int, int]) -> tuple[float, int, int]:
+        count, side = of
+        wanted = late * count - side * lead
+        return round(abs(wanted - round(wanted)) / count, 6), count, side
+
+    count, side = min(((count, side) for count in range(least, least + max(least // 2, 1) + 1) for side in (-1, 1)), key=off)
+    return count, max(round(late * count - side * lead), 0), side
 
 
 def _num(value: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
 DEGREE = TURN / 360.0  # rad
+WIDTH = 100  # characters of a line of comment
 LEAST_GAIN, LEAST_PHASE = 1.7, 35.0  # margins without the derivative's low-pass or with rounded times: a machine that warms up needs them
 
 
@@ -41,7 +43,7 @@ class Designed:
 
 @dataclass(frozen=True, slots=True)
 class Snippet:
-    """target: its name; file: name of the file; text: in the target's own syntax; note: what it cannot represent."""
+    """target: its name; file: name of the file; text: in the target's own syntax, with the note as a comment; note: what it cannot represent."""
 
     target: str
     file: str
@@ -59,8 +61,8 @@ def ros2_control(of: Designed) -> Snippet:
         bound = f"{limit - fed:.6g}"
         shared += f": of {limit:.4g} {of.units.input} it leaves {fed:.3g} to the feedforward, for up to {of.speed or 0.0:.3g} {of.units.speed}"
     name = "'" + of.axis.replace("'", "''") + "'"  # in quotes: the parser of ROS 2 reads a plain y or no as a bool, and 1 as an integer
+    head = f"# u = p e + i int(e) + d de/dt in {of.units.input}, e in {of.units.output}, at {loop.sampling_rate:g} Hz"
     lines = [
-        f"# u = p e + i int(e) + d de/dt in {of.units.input}, e in {of.units.output}, at {loop.sampling_rate:g} Hz",
         "pid_controller:",
         "  ros__parameters:",
         f"    dof_names: [{name}]",
@@ -82,9 +84,10 @@ def ros2_control(of: Designed) -> Snippet:
     note = (
         "feedforward_gain is kV: the controller multiplies the commanded velocity by it while enable_feedforward is true; a version "
         "without this parameter has the service ~/set_feedforward_control instead. "
-        f"{shared}; kS and kA have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
+        f"{shared}; kS ({of.gains.value('kS'):.4g} {of.units.input}) and kA ({of.gains.value('kA'):.4g} {of.units.input}/({of.units.output}/s2)) "
+        f"have no place in it, add them in a controller of your own.{_gravity(of)} {_unfiltered(loop)}"
     )
-    return Snippet("ros2_control", "controllers.yaml", "\n".join(lines) + "\n", note)
+    return Snippet("ros2_control", "controllers.yaml", _text([head, *_comment(note), *lines]), note)
 
 
 def klipper(of: Designed) -> Snippet:
@@ -94,14 +97,14 @@ def klipper(of: Designed) -> Snippet:
     axis = of.axis if of.axis in ("x", "y") else "x"
     other = f"; the axis is {of.axis!r}, and Klipper shapes x and y: change _x to _y if it is that one" if axis != of.axis else ""
     lines = [
-        *([f"# of axis {of.axis!r}, written as x"] if other else []),
         "[input_shaper]",
         f"shaper_type_{axis}: {of.shaper.name}",
         f"shaper_freq_{axis}: {of.shaper.frequency:.2f}",
         f"damping_ratio_{axis}: {of.shaper.damping:.4f}",
     ]
     note = f"Klipper drives steppers without feedback: only the shaper applies{other}"
-    return Snippet("klipper", "printer.cfg", "\n".join(lines) + "\n", note)
+    head = [f"# of axis {of.axis!r}, written as x"] if other else []
+    return Snippet("klipper", "printer.cfg", _text([*head, *_comment(note), *lines]), note)
 
 
 def linuxcnc(of: Designed) -> Snippet:
@@ -121,15 +124,15 @@ def linuxcnc(of: Designed) -> Snippet:
         "bias": of.gains.value("kG"),
         "maxoutput": size - outside if size < NO_LIMIT else 0.0,
     }
-    lines = [f"# command in {of.units.input}, position in {length}; run the thread at {loop.sampling_rate:g} Hz"]
+    head = f"# output in {of.units.input}, position in {length}; run the thread at {loop.sampling_rate:g} Hz; needs loadrt pid names=pid.{at}"
     unsure = {name: _unsure(of, gain) for name, gain in (("FF1", "kV"), ("FF2", "kA"), ("bias", "kG"))}
-    lines += [f"# {name} is {doubt}" for name, doubt in unsure.items() if doubt]
+    lines = [f"# {name} is {doubt}" for name, doubt in unsure.items() if doubt]
     lines += [f"setp pid.{at}.{name} {value:.6g}" for name, value in values.items()]
     note = (
         f"pid has no kS: add {of.gains.value('kS'):.4g} {of.units.input} with the sign of the commanded velocity.{_gravity(of)} "
         f"{'maxoutput leaves room for it. ' if outside and size < NO_LIMIT else ''}{_unfiltered(loop)}"
     )
-    return Snippet("linuxcnc", "axis.hal", "\n".join(lines) + "\n", note)
+    return Snippet("linuxcnc", "axis.hal", _text([head, *_comment(note), *lines]), note)
 
 
 def odrive(of: Designed) -> Snippet:
@@ -161,7 +164,7 @@ def odrive(of: Designed) -> Snippet:
         "ODrive's inertia is what kA is here, per turn. "
         f"It has no kS and kV: add their torque to input_torque.{_gravity(of)}"
     )
-    return Snippet("odrive", "odrivetool", "\n".join(lines) + "\n", note)
+    return Snippet("odrive", "odrivetool", _text([*_comment(note), *lines]), note)
 
 
 def twincat(of: Designed) -> Snippet:
@@ -200,8 +203,8 @@ def twincat(of: Designed) -> Snippet:
         f"stParams.fOutMaxLimit := {own.limit:.9E} - fFeedforward; (* the sum stays within the limit, and the integral stops there *)",
         f"stParams.fOutMinLimit := {-own.limit:.9E} - fFeedforward;",
     ]
+    head = f"(* Axis {of.axis}: input in {of.units.input}, position in {length}. Call it in a task of {cycle:g} ms. *)"
     lines = [
-        f"(* Axis {of.axis}: input in {of.units.input}, position in {length}. Call it in a task of {cycle:g} ms. *)",
         f"PROGRAM {_identifier(of.axis)}",
         "VAR_INPUT",
         f"    fSetPosition : LREAL; (* {length} *)",
@@ -231,7 +234,16 @@ def twincat(of: Designed) -> Snippet:
     left = f"a phase margin of {loop.counted.phase:.3g} degrees and a gain margin of {loop.counted.gain:.3g} are left"
     doubt = f"; {of.gains.doubt}" if of.gains.doubt else ""
     note = f"needs Tc2_ControllerToolbox; times are whole milliseconds, so {left}; the integral stops with the sum at the limit{doubt}"
-    return Snippet("twincat", "axis.st", "\n".join(lines) + "\n", note)
+    return Snippet("twincat", "axis.st", _text([head, *_comment(note, "(* ", " *)"), *lines]), note)
+
+
+def _comment(note: str, before: str = "# ", after: str = "") -> list[str]:
+    """The note as lines of comment: who pastes the file months later reads what it lacks."""
+    return [f"{before}{line}{after}" for line in textwrap.wrap(note, WIDTH)]
+
+
+def _text(lines: list[str]) -> str:
+    return "\n".join(lines) + "\n"
 
 
 def _feedforward(of: Designed, per: float, length: str) -> list[tuple[str, float, str]]:
