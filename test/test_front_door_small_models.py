@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -53,12 +54,13 @@ def test_a_transfer_function_of_a_current_gives_inertia_and_damping(tmp_path: Pa
     """At the joint and at the motor, with the names of MuJoCo and URDF, from Python and from the command; without a torque constant nothing."""
     rng = np.random.default_rng(2)
     u = rng.normal(0.0, 1.0, 12_000)
-    joint = signal.cont2discrete(([0.5], [0.1, 1.0] if measured == "rad/s" else [0.1, 1.0, 0.0]), 1.0 / RATE)
+    slow = np.array([0.1, 1.0] if measured == "rad/s" else [0.1, 1.0, 0.0])
+    joint = signal.cont2discrete((np.array([0.5]), slow), 1.0 / RATE)
     y = signal.lfilter(np.ravel(joint[0]), joint[1], u) + rng.normal(0.0, 1e-5, u.size)
     np.savetxt(tmp_path / "joint.csv", np.column_stack((np.arange(u.size) / RATE, u, y)), "%.12g", ",", header="time,current,out", comments="")
     columns, units = {"input": "current", "output": "out"}, {"input": "A", "output": measured}
-    found = xy.fit(xy.load(tmp_path / "joint.csv", columns=columns, units=units).run("x"))
-    rows = {str(row[0]): row for row in xy.mechanics(found, kt=0.12, gear="10")}
+    found = xy.fit(xy.frf(xy.load(tmp_path / "joint.csv", columns=columns, units=units).run("x")))
+    rows: dict[str, Any] = {str(row[0]): row for row in xy.mechanics(found, kt=0.12, gear="10")}
     assert rows["inertia"][1] == pytest.approx(0.12 * 10.0 * 0.1 / 0.5, rel=0.05) and rows["inertia"][2] < 0.24 < rows["inertia"][3]
     assert rows["damping"][5] == pytest.approx(0.12 / 0.5 / 10.0, rel=0.05) and rows["inertia"][7] == "armature"
     assert len(xy.mechanics(found)) == 0
