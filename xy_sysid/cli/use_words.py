@@ -54,6 +54,9 @@ def show(name: str, used: Used) -> None:
             rows.append((f"{one.name}{' (best)' if one is used.shaper else ''}", f"{1e3 * one.duration:.3g}", *vibration))
         title = f"axis {name}: input shapers at {used.shaper.frequency:.2f} Hz, damping {used.shaper.damping:.3g}"
         table(title, ("shaper", "ms longer", "vibration left, %", "at worst over the interval, %"), rows)
+        if used.rings is not None:
+            before, after = (moved(value, units.output) for value in used.rings)
+            say(f"  After the fastest S-curve below the load swings by {before}; with the {used.shaper.name} shaper by {after}.")
     for item in (*used.tables, *([used.friction] if used.friction is not None else [])):
         say(f"  Table {item.name}: {item.before:.3g} {item.unit} rms, known to {item.after:.2g}; {item.meaning}.")
     if used.gap is not None:
@@ -155,7 +158,7 @@ def _mode(mode: Swing) -> str:
 
 def answer(used: Used) -> dict[str, Any]:
     """The JSON document of an axis, without the model, which has its own file, and without the paths."""
-    designs = ("friction", "tables", "gap", "modes", "shaper", "shapers", "allowed")
+    designs = ("friction", "tables", "gap", "modes", "shaper", "shapers", "rings", "allowed")
     names = ("sampling_rate", "rate_from", "calculation", "limit", "limit_from", "travel", *designs, "predicted", "tracking")
     found: dict[str, Any] = {name: getattr(used, name) for name in names}
     found["gains"] = {

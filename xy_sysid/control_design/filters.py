@@ -25,6 +25,7 @@ from xy_sysid.samples.block import FloatArray
 TOLERATED = 0.05  # of the unshaped vibration that an EI shaper leaves at its own frequency (Klipper: 1 / 20)
 WIDEST, NARROWEST = 0.7, 0.05  # damping ratio of a notch's poles
 UNIT = 1.0  # rad/s, rate at which roots are computed
+ARRIVED = 1e-9  # of a path's length, from its end: as near as that it has arrived
 HIGHEST = 0.45  # of the sampling rate: frequency of a filter in the loop
 
 
@@ -194,6 +195,17 @@ def vibration(amplitudes: tuple[float, ...], times: tuple[float, ...], frequency
     last = times[-1]
     total = sum(size * cmath.exp(-damping * w * (last - time)) * cmath.exp(-1j * swing * time) for size, time in zip(amplitudes, times, strict=True))
     return abs(total)
+
+
+def rings_after(path: SampledPath, mode: Swing) -> float:
+    """Amplitude, m, with which the load still swings about the encoder's side when that side has arrived at the end of a path."""
+    w, damping, rate = 2.0 * math.pi * mode.held.value, mode.held_damping, path.sampling_rate
+    tail = np.full(math.ceil(2.0 * rate / mode.held.value), path.position[-1])
+    held = np.concatenate((path.position, tail)) - path.position[0]
+    load = ([2.0 * damping * w, w * w], [1.0, 2.0 * damping * w, w * w])
+    _, place, _ = scipy.signal.lsim(load, held, np.arange(held.size) / rate)
+    moving = np.flatnonzero(np.abs(held - held[-1]) > ARRIVED * float(np.ptp(held)))
+    return 0.5 * float(np.ptp(place[int(moving[-1]) + 1 if moving.size else 0 :]))
 
 
 def best_shaper(found: tuple[Shaper, ...], tolerated: float = TOLERATED) -> Shaper:

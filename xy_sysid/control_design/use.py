@@ -15,7 +15,7 @@ from xy_sysid.control_design.bandwidth import Bandwidth, bandwidth_of, with_filt
 from xy_sysid.control_design.closed_loop import NO_LIMIT, Encoder
 from xy_sysid.control_design.compensation import Compensation
 from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, Feedback, feedback
-from xy_sysid.control_design.filters import LoopFilter, Shaper, Swing, best_shaper, modes, notch, shapers
+from xy_sysid.control_design.filters import LoopFilter, Shaper, Swing, best_shaper, modes, notch, rings_after, shapers
 from xy_sysid.control_design.gains import Gains, gains
 from xy_sysid.control_design.inverse import not_undone
 from xy_sysid.control_design.laws import largest_voltage
@@ -51,6 +51,7 @@ class Used:
     there is nothing to design, or if it was refused
     allowed: the highest crossover, and the cost of each part of the axis; filter, filtered: the notch or low-pass with which the loop reaches the
     highest crossover, and that loop; None if none reaches more
+    rings: m, amplitude with which the load swings after the fastest path, without and with the best shaper; None without a mode or a path
     predicted: input of the recording that is not predicted, if there is a recording; tracking: simulated tracking errors
     compensation: along the first path of ``tracking``; exported source inverts its laws
     refused: (design, why) of designs that are missing; not_undone: (effect, why) that the feedforward does not invert; notes: to be read first
@@ -77,6 +78,7 @@ class Used:
     filtered: Feedback | None
     shapers: tuple[Shaper, ...]
     shaper: Shaper | None
+    rings: tuple[float, float] | None
     fastest: Fastest | None
     predicted: Predicted | None
     tracking: tuple[Tracking, ...]
@@ -155,6 +157,7 @@ def use(
         quick = _tried("fastest path", lambda: fastest(models, ends, drive, rate), refused)
     soon = later(model, max(wait - 1.0 / rate, 0.0))  # a period of calculation is part of the design of the state feedback
     states = _tried("state feedback", lambda: state_feedback(_placed(soon, sensed), rate, asked), refused)
+    rings = None if quick is None or not every else (rings_after(quick.path, swings[0]), rings_after(best_shaper(every).shape(quick.path), swings[0]))
     followed: list[tuple[Tracking, Compensation]] = []
     if loop is not None:
         paths = []
@@ -191,6 +194,7 @@ def use(
         filtered=None if better is None else better[1],
         shapers=every,
         shaper=best_shaper(every) if every else None,
+        rings=rings,
         fastest=quick,
         predicted=None if run is None else _tried("prediction", lambda: predicted(model, found, run, table), refused),
         tracking=tuple(item for item, _ in followed),
