@@ -200,6 +200,11 @@ def position_of(unit: str) -> str:
     return unit.removesuffix("/s^2").removesuffix("/s")
 
 
+def units_of(given: str, measured: str) -> Units:
+    """Units of the input and of the position, whichever of its derivatives was measured."""
+    return Units(given, position_of(measured))
+
+
 def over(top: str, bottom: str) -> str:
     """One unit over another: m/V, rad/(N m)."""
     return f"{top}/{bottom}" if bottom.isalpha() else f"{top}/({bottom})"

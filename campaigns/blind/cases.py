@@ -164,7 +164,7 @@ class Case:
 
 @lru_cache(maxsize=64)
 def _dirt(case: Case) -> Dirt:
-    """The dirt, scaled on the axis without its true effect: across a gap, any small change of the motion would grow to full size."""
+    """The dirt. Its size is set on the axis without the effects to be found, as backlash would let the smallest change grow."""
     spec = case.exact().with_parts(dict.fromkeys(case.parts, False)).spec
     machine = Machine(replace(spec, inner_rate=SMOOTH * case.rate))
     words = [int.from_bytes(text.encode(), "big") for text in (case.group, *case.truth)]

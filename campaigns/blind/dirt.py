@@ -20,7 +20,7 @@ DIRT = (
 FEWEST, MOST = 3, 5  # kinds of dirt on one axis
 SPREAD = 0.7  # standard deviation of the logarithm of their shares
 BAND = 700.0  # Hz; higher frequencies do not count
-PROBE = 10.0  # s of simulation that decide how the dirt is shared between its parts; its total is scaled on the full record
+PROBE = 10.0  # s, length of the simulations that set the share of each kind; the full record sets their sum
 STEPS = 3  # most corrections of the mixture
 CLOSE = 0.03  # relative difference from the requested amount at which corrections end
 

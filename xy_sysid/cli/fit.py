@@ -51,6 +51,7 @@ def fit(
     from xy_sysid.fitting.of_given_response import band_of
     from xy_sysid.fitting.of_recording import estimate, few_periods, split
     from xy_sysid.fitting.of_run import Method, fit_response
+    from xy_sysid.units import units_of
 
     settings = o.settings_from(params, set_)
     o.output_file("--model", model, force)
@@ -60,6 +61,7 @@ def fit(
     way.structure(settings)  # raises BadInput for invalid combinations, before any work
     measured = measured_responses(recs, reading, averages)
     if measured is not None:
+        drives = {name: drive_from(kt, gear, units_of(one.input_unit, one.output_unit)) for name, one in measured.items()}
         done, problems = each(tuple(measured), lambda name: _of_response(name, band_of(measured[name], settings), settings, way))
         origin: dict[str, Any] = {**provenance_of_response(named(recs)), "notes": []}
     else:
@@ -71,6 +73,7 @@ def fit(
                 "Leave it out: the windows of a recording are counted automatically.",
             )
         recording = read(recs, reading, json)
+        drives = dict.fromkeys(recording.axes, drive_from(kt, gear, recording.units))
         if len(recording) and few_periods(recording, held_out):
             held_out = 0.0
             aside.print("note: the recording has hardly more than two periods of the input, so nothing is held out for the check in time")
@@ -83,7 +86,6 @@ def fit(
         done, problems = each(chosen(recording, reading.axes), work)
         origin = provenance(named(recs), recording)
     fits = {name: result for name, (_, result, _) in done.items()}
-    drives = {name: drive_from(kt, gear, result.units) for name, result in fits.items()}
     if model is not None:
         linear_models.write_model(model, fits, origin)
     if mat is not None:

@@ -85,8 +85,13 @@ class Tracked:
     @property
     def rms(self) -> float:
         """Tracking error, m rms; infinite if the simulation diverged."""
-        value = float(np.sqrt(np.mean(self.error**2)))
-        return value if np.isfinite(value) else float("inf")
+        return rms(self.error)
+
+
+def rms(values: FloatArray) -> float:
+    """Root of the mean square; infinite if the simulation diverged."""
+    value = float(np.sqrt(np.mean(values**2)))
+    return value if math.isfinite(value) else math.inf
 
 
 def loop_text(name: str) -> str:

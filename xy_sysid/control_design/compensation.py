@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, shake
+from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, rms, shake
 from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.laws import along, ask, force, of_category
@@ -172,7 +172,7 @@ def compensate(models: Sequence[AxisModel], found: Gains, path: SampledPath, con
 
     def judged(terms: tuple[str, ...], wanted: SampledPath, voltage: FloatArray, inverse: AxisModel | None = None) -> _Tried:
         runs = [follow_path(model, wanted, controller, voltage, encoder) for model in judges]
-        errors = np.array([_rms(path.position - run.carried) for run in runs])
+        errors = np.array([rms(path.position - run.carried) for run in runs])
         largest = max(float(np.max(np.abs(run.voltage))) for run in runs)
         return _Tried(terms=terms, path=wanted, voltage=voltage, errors=errors, largest=largest, inverse=inverse)
 
@@ -238,8 +238,3 @@ def _worth_undoing(model: AxisModel, undoing: Callable[[tuple[str, ...]], _Tried
         gone = (*gone, *set(best.terms).difference(tried.terms))
         best = tried
     return best, gone
-
-
-def _rms(values: FloatArray) -> float:
-    value = float(np.sqrt(np.mean(values**2)))
-    return value if np.isfinite(value) else float("inf")

@@ -157,7 +157,10 @@ def use(
         quick = _tried("fastest path", lambda: fastest(models, ends, drive, rate), refused)
     soon = later(model, max(wait - 1.0 / rate, 0.0))  # a period of calculation is part of the design of the state feedback
     states = _tried("state feedback", lambda: state_feedback(_placed(soon, sensed), rate, asked), refused)
-    rings = None if quick is None or not every else (rings_after(quick.path, swings[0]), rings_after(best_shaper(every).shape(quick.path), swings[0]))
+    shaper = best_shaper(every) if every else None
+    rings = None
+    if quick is not None and shaper is not None:
+        rings = rings_after(quick.path, swings[0]), rings_after(shaper.shape(quick.path), swings[0])
     followed: list[tuple[Tracking, Compensation]] = []
     if loop is not None:
         paths = []
@@ -193,7 +196,7 @@ def use(
         filter=None if better is None else better[0],
         filtered=None if better is None else better[1],
         shapers=every,
-        shaper=best_shaper(every) if every else None,
+        shaper=shaper,
         rings=rings,
         fastest=quick,
         predicted=None if run is None else _tried("prediction", lambda: predicted(model, found, run, table), refused),

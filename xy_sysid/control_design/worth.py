@@ -11,7 +11,7 @@ import scipy
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, shake
+from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path, rms, shake
 from xy_sysid.control_design.compensation import Compensation, compensate
 from xy_sysid.control_design.gains import Gains, simple_feedforward
 from xy_sysid.control_design.inverse import feedforward
@@ -62,7 +62,8 @@ class Tracking:
     path: in words; feedback, simple, whole, compensated: alone, with kS, kV and kA, with every law inverted, with the laws whose inversion helps
     worst: of the compensated axis over samples of its parameters; largest: V, the largest voltage of any of them; limit: V
     undone, left: laws that the compensation inverts, and (law, why) of the others
-    loops: the other feedbacks that were designed, with the same compensation
+    loops: the other feedbacks that were designed, with the same compensation; state feedback only where the calculation takes a period at least,
+        because its design contains that period
     """
 
     path: str
@@ -150,7 +151,7 @@ def tracked(
         path=name,
         feedback=made.centre[0],
         simple=made.centre[1],
-        whole=float(np.sqrt(np.mean((wanted.position - whole.carried) ** 2))),
+        whole=rms(wanted.position - whole.carried),
         compensated=made.centre[2],
         worst=made.chosen,
         largest=made.largest,
@@ -165,11 +166,6 @@ def tracked(
 def _loop(name: str, made: Compensation, wanted: SampledPath, controller: Controller, models: Sequence[AxisModel], encoder: Encoder) -> Loop:
     alone = follow_path(models[0], wanted, controller, None, encoder)
     runs = [follow_path(model, made.path, controller, made.voltage, encoder) for model in models]
-    errors = [_rms(wanted.position - run.carried) for run in runs]
+    errors = [rms(wanted.position - run.carried) for run in runs]
     largest = max(float(np.max(np.abs(run.voltage))) for run in runs)
-    return Loop(name=name, alone=_rms(wanted.position - alone.carried), compensated=errors[0], worst=max(errors), largest=largest)
-
-
-def _rms(values: FloatArray) -> float:
-    value = float(np.sqrt(np.mean(values**2)))
-    return value if math.isfinite(value) else math.inf
+    return Loop(name=name, alone=rms(wanted.position - alone.carried), compensated=errors[0], worst=max(errors), largest=largest)

@@ -201,8 +201,8 @@ class Drive:
         if backwards:
             what = "voltage" if self.settings.output == "blocks" else self.settings.interface
             return (
-                f"{self.axes[backwards[0]]}: plus {what} moves it to minus: swap the motor's wires or the encoder's sign, unless run --first "
-                "finds that plus is plus: then its delay is too long for a signal this fast, so lower the setting low"
+                f"{self.axes[backwards[0]]}: plus {what} moves it to minus: swap the motor's wires or the encoder's sign. If run --first says that "
+                "plus is plus, the delay is too long for so fast a signal: lower the setting low"
             )
         return self._motion.saw(seq, values)
 

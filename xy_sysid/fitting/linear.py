@@ -6,7 +6,6 @@ and delay enter as a correction of the data: the difference that they make in th
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -80,39 +79,13 @@ def _solved(
 
 @compiled
 def _least(table: NDArray[np.float64]) -> NDArray[np.float64]:
-    """x that minimises |sum_k x_k table[k] - table[-1]|, by Householder reflections in place.
-
-    A coefficient that is not determined is 0; all are 0 if a number is not finite.
-    """
-    size, count = table.shape[0] - 1, table.shape[1]
-    diagonal, solution = np.zeros(size), np.zeros(size)
-    largest = 0.0
-    for j in range(min(size, count)):
-        norm = 0.0
-        for i in range(j, count):
-            norm += table[j, i] * table[j, i]
-        norm = math.sqrt(norm)
-        if not math.isfinite(norm):
-            return solution
-        if norm == 0.0:
-            continue
-        largest = max(largest, norm)
-        diagonal[j] = -norm if table[j, j] > 0.0 else norm
-        table[j, j] -= diagonal[j]
-        for k in range(j + 1, size + 1):
-            along = 0.0
-            for i in range(j, count):
-                along += table[j, i] * table[k, i]
-            along /= diagonal[j] * table[j, j]
-            for i in range(j, count):
-                table[k, i] += along * table[j, i]
-    for j in range(size - 1, -1, -1):
-        if abs(diagonal[j]) > SMALLEST * largest:
-            value = table[size, j]
-            for k in range(j + 1, size):
-                value -= table[k, j] * solution[k]
-            solution[j] = value / diagonal[j]
-    return solution
+    """x that minimises |sum_k x_k table[k] - table[-1]|; all 0 if a number is not finite."""
+    size = table.shape[0] - 1
+    if not np.all(np.isfinite(table)):
+        return np.zeros(size)
+    upper = np.linalg.qr(table.T)[1]
+    found: FloatArray = np.linalg.lstsq(np.ascontiguousarray(upper[:size, :size]), np.ascontiguousarray(upper[:size, size]), SMALLEST)[0]
+    return found
 
 
 def reweighted(task: Problem, delay: float, steps: int, start: Point | None = None) -> tuple[Point, float, int]:

@@ -10,7 +10,7 @@ from xy_sysid.fitting.structure import Structure
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.units import Units, position_of
+from xy_sysid.units import Units, units_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class Fit:
     @property
     def units(self) -> Units:
         """Of the input and of the position, whichever of its derivatives was measured."""
-        return Units(self.tf.input_unit, position_of(self.tf.output_unit))
+        return units_of(self.tf.input_unit, self.tf.output_unit)
 
     @property
     def rigid(self) -> tuple[Interval, ...]:

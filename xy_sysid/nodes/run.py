@@ -35,7 +35,7 @@ class Runnable(Protocol):
         ...
 
     def last_words(self) -> None:
-        """Called once when the node ends, also after an error. Publishers still work at this time."""
+        """Called once, when the node ends or fails. Publishers can still send."""
         ...
 
     def destroy_node(self) -> None:
