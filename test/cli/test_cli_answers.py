@@ -364,6 +364,8 @@ def test_compare_without_a_model_says_which_model_its_numbers_belong_to(tmp_path
     """Its linear model and its third of the data are not those of diagnose and report, so its multiple of the floor differs; no note with a model."""
     file, model = npz(tmp_path / "a.npz"), tmp_path / "model.yaml"
     for said in (cli("compare", file).err.replace("\n  ", " "), " ".join(cli("compare", file, "--json").json["notes"])):
-        assert "a linear model of the first two thirds, on the last third" in said
+        assert "a linear one is fitted to the first two thirds and judged on the last third" in said
     assert cli("fit", file, *RIGID, "--model", model).code == 0
-    assert "of a linear model of the first two thirds" not in cli("compare", npz(tmp_path / "b.npz", rows=20_000), model).err
+    assert "no model is given" not in cli("compare", npz(tmp_path / "b.npz", rows=20_000), model).err
+    assert cli("simulate", tmp_path / "two", "--duration", "10").code == 0
+    assert cli("compare", tmp_path / "two").err.count("no model is given") == 1, "a note about both axes is said once"

@@ -12,7 +12,7 @@ from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import aside, emit, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, read, reads
-from xy_sysid.units import moved, told
+from xy_sysid.units import listed, moved, told
 
 if TYPE_CHECKING:
     from xy_sysid.comparison.of_run import Judgement
@@ -78,8 +78,6 @@ def compare(
     def judged_axis(name: str) -> Judgement:
         item = judge(recording, name, models[0][name] if models else None, settings)
         splits[name] = distorted(recording.run(name))
-        for note in () if json else item.notes:
-            say(f"axis {name}: {note}", aside)
         return item
 
     found, refused = each(names, judged_axis)
@@ -93,6 +91,12 @@ def compare(
             }
         )
         return
+    notes: dict[str, list[str]] = {}
+    for name, judged in found.items():
+        for note in judged.notes:
+            notes.setdefault(note, []).append(name)
+    for note, axes in notes.items():
+        say(f"{'axis' if len(axes) == 1 else 'axes'} {listed(axes)}: {note}", aside)
     for name, judged in found.items():
         item, line, split = judged.where, judged.check, splits[name]
         size = f"{moved(item.error, item.unit, 4)}, noise floor {moved(item.noise_floor, item.unit, 4)}, up to {item.band_end:.4g} Hz"

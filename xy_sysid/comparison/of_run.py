@@ -23,7 +23,7 @@ from xy_sysid.units import told
 
 HELD_OUT = 1.0 / 3.0  # of the recording, if the model was fitted to it
 SEEN = "the model was fitted to this recording; only its last third is used"
-OWN = "these numbers are of a linear model of the first two thirds, on the last third; to judge another model, give its file"
+OWN = "no model is given, so a linear one is fitted to the first two thirds and judged on the last third; to judge another, give its file"
 
 MOST_LEFT = 0.7  # of the motion: half of its power
 HARDLY = "The model explains little of the motion: it does not describe this axis, or input and output do not belong together."
