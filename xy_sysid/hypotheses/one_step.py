@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from math import exp
+from math import exp, hypot, sqrt
 
 import numpy as np
 
@@ -64,10 +64,9 @@ class OneStepTrials:
         return one_step_names(self.pool.library) if len(self.pool.data.starts) == 1 else ()
 
     def due(self, last: bool) -> bool:
-        """Whether the best set leaves more error than it explains; checked after the first simulations and at the end of the search (last)."""
+        """Whether the error of the best set exceeds the floor; checked after the first simulations and at the end of the search (last)."""
         best = self.pool.best
-        left = best.fit.excess >= AT_FLOOR and not self._explains(best)
-        return bool(self.names) and left and (last or (not self.asked and len(self.pool.nodes) > FEWEST))
+        return bool(self.names) and best.fit.excess >= AT_FLOOR and (last or (not self.asked and len(self.pool.nodes) > FEWEST))
 
     def tried(self, last: bool) -> Iterator[frozenset[str]]:
         """Try each together with the effects of the best set that a filter can contain, and alone; last: also with the effects that it masks.
@@ -112,10 +111,11 @@ class OneStepTrials:
     def _fit_once(self, name: str, node: Node, masked: bool) -> None:
         pool = self.pool
         bar = min(self.error_one_step_ahead(each.fit) for each in {node, pool.best})
-        key = (name, node.effects, masked)
-        if not FILTERED * bar > pool.data.encoder * pool.data.sampling_rate or key in self.fitted:
+        key, noise = (name, node.effects, masked), pool.data.encoder * pool.data.sampling_rate
+        if not bar > exp(0.5 * TELLS) * noise or key in self.fitted:
             return
-        demand = Demand(Limits(FILTERED * bar, pool.late), lambda fit: refusal(pool.data, pool.library, fit), masked)
+        limits = Limits(hypot(noise, FILTERED * sqrt(bar**2 - noise**2)), pool.late)
+        demand = Demand(limits, lambda fit: refusal(pool.data, pool.library, fit), masked)
         extension = extended(pool.data, node.fit, pool.library[name], demand)
         self.fitted[key] = extension
         result = OneStepResult((*self._up_to(node), *extension.rungs), bar, error_without(pool.data, extension.found))

@@ -14,7 +14,7 @@ import numpy as np
 from xy_sysid.effects._contract import Companions, DryFriction, FilterFit, OneStepTask
 from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import CLOSED, Innovations, View
-from xy_sysid.effects.backlash.starts import SECOND, best_of_grids
+from xy_sysid.effects.backlash.starts import SECOND, best_around, best_of_grid
 from xy_sysid.effects.backlash.usual_machine import from_usual, to_usual, usual
 from xy_sysid.samples.block import FloatArray
 
@@ -23,8 +23,8 @@ SOFT = 10.0  # rad/s, lower bound of the contact that replaces the gap in the fi
 SEEN, LEFT = 2.5, 1.5  # least gap, in encoder noises, and in rms innovations
 WHOLE = View(samples=1_000_000, process_noise_factor=0.5, sub_steps=4)
 PROCESS_NOISE_FACTORS = (1.0, 0.3, 0.1, 0.03)  # factors on the process noise to choose from: the one that predicts the first stage best
-BEHIND = 1.5  # held-out innovation over the bar after the first fits, above which the fit is given up. Development draws and other machines:
-# true gaps 0.1 to 1.1; no gap 1.2 to 18
+BEHIND = 1.5  # innovation over the bar, above which the fit is given up after the first grid, and after the second. Development draws and other
+# machines: true gaps 0.1 to 1.4 and 0.1 to 1.1; no gap 1.5 to 20 and 1.2 to 18
 IDLE = 0.9  # innovation with a gap over that without it, after the first fits, above which the gap has no effect, and must reach the bar. The same
 # machines: gaps that were finally found 0.04 to 0.82; no gap mostly 0.95 to 1.1
 OWN, GAP, HERTZ = len(NAMES), NAMES.index("gap"), NAMES.index("hertz")
@@ -41,7 +41,12 @@ class Contact:
         fit = Innovations(task.sampling_rate, task.base, task.noise, task.companions, task.dry.laws)
         fit.late = task.limits.late
         whole, near = WHOLE.within(task.stages[0]), SECOND.within(task.stages[0])
-        best = self._first_fit(fit, task)
+        best = self._earlier(fit, task)
+        if best is None:
+            found, scale = best_of_grid(fit, task)
+            if task.limits.bar is not None and scale * task.noise > BEHIND * task.limits.bar:
+                return self._result(fit, task, found, (1.0, fit.innovations(found, View(task.stages[2]))))
+            best = best_around(fit, task, found)
         rigid = self._fit_without_gap(fit, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
         if task.limits.bar is not None:
             process_noise_factor, innovation = self._predicted(fit, best, task)
@@ -101,11 +106,11 @@ class Contact:
         return fit.innovations(fit.start(found.base, found.values, found.dry.values), View(samples, found.process_noise_factor))
 
     @staticmethod
-    def _first_fit(fit: Innovations, task: OneStepTask) -> FloatArray:
-        """Coordinates after the first fit: from an earlier result, or from a grid, because a fit cannot reopen a closed gap."""
+    def _earlier(fit: Innovations, task: OneStepTask) -> FloatArray | None:
+        """Coordinates from an earlier result; None without one, or with a closed gap, which a fit cannot reopen: a grid has to be searched."""
         earlier = task.earlier
         if earlier is None or earlier.too_small:
-            return best_of_grids(fit, task)
+            return None
         start = fit.start(earlier.base, earlier.values, earlier.dry.values if earlier.dry.names == task.dry.names else task.dry.values)
         return fit.solved(start, np.arange(start.size), SECOND.within(task.stages[0]), 15, 1e-2)
 

@@ -35,14 +35,13 @@ GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 class View:
     """Settings of a filter run.
 
-    samples: number of samples from the first; process_noise_factor, encoder_noise_factor: factors on the noise that the filter assumes
+    samples: number of samples from the first; process_noise_factor: factor on the process noise that the filter assumes
     sub_steps: least number in a sample; turn: largest phase of the closed contact in a sub-step, rad
     """
 
     samples: int
     process_noise_factor: float = 1.0
     sub_steps: int = 6
-    encoder_noise_factor: float = 1.0
     turn: float = 0.35
 
     def within(self, samples: int) -> View:
@@ -186,7 +185,7 @@ class Innovations:
             against,
             own,
             self.fs,
-            (view.encoder_noise_factor * noise) ** 2,
+            noise**2,
             drift,
             max(view.sub_steps, self._sub_steps(numbers, view.turn)),
             *moved,

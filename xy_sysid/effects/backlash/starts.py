@@ -1,4 +1,4 @@
-"""Start values for a fit of the contact: the best of a grid, then of a second grid around the first result.
+"""Start values for a fit of the contact: the best of a grid, and then the best of a second grid around it.
 
 The cost of a gap has many local minima, and those of a stiff contact are narrow. A filter that assumes large process noise
 forgets within a few milliseconds, so its minima are wide; a thousand runs over two seconds take less than a second.
@@ -34,18 +34,24 @@ ENOUGH = 3e-3  # relative fall of the cost in a step, below which it ends
 GAP, RATE, HERTZ = (NAMES.index(name) for name in ("gap", "rate", "hertz"))
 
 
-def best_of_grids(fit: Innovations, task: OneStepTask) -> FloatArray:
-    """Coordinates near the best fit: the best of a grid, then the best of a second grid around it."""
-    first, second = FIRST.within(task.stages[0]), SECOND.within(task.stages[0])
+def best_of_grid(fit: Innovations, task: OneStepTask) -> tuple[FloatArray, float]:
+    """Coordinates of the best of a grid after some solver steps, and the scale of its innovations, over the encoder noise."""
+    view = FIRST.within(task.stages[0])
     grid = product(_gaps(task.noise, task.companions.swing), SHARES, RATES, DAMPINGS)
     starts = [fit.start(task.base, (*numbers, *REST), task.dry.values) for numbers in grid]
-    found = _best_after_rounds(fit, _best(fit, starts, first, APART, BEST[0]), first)
+    found = _best_after_rounds(fit, _best(fit, starts, view, APART, BEST[0]), view)
+    return found, fit.scale(fit.innovations(found, view))
+
+
+def best_around(fit: Innovations, task: OneStepTask, found: FloatArray) -> FloatArray:
+    """Coordinates near the best fit: the best of a second grid, around the result of the first."""
+    view = SECOND.within(task.stages[0])
     around = [found]
     for wider, stiffer, hertz in product(*AROUND):
         numbers = fit.outer(found)
         numbers[GAP], numbers[RATE], numbers[HERTZ] = numbers[GAP] * wider, numbers[RATE] * stiffer, hertz
         around.append(fit.inner(numbers))
-    return _best_after_rounds(fit, [found, *_best(fit, around, second, NEAR, BEST[1])], second)
+    return _best_after_rounds(fit, [found, *_best(fit, around, view, NEAR, BEST[1])], view)
 
 
 def _best(fit: Innovations, starts: list[FloatArray], view: View, apart: dict[str, float], most: int) -> list[FloatArray]:
