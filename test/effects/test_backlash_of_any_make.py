@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.gap_machines import GapMachine, driven
 
+from xy_sysid.diagnosis.diagnose import diagnose
 from xy_sysid.effects import EFFECTS
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import fit_base
@@ -41,6 +42,21 @@ def test_the_contact_comes_out_right_too() -> None:
     assert fit.parameter("backlash.rate").value == pytest.approx(2.0 * np.pi * 650.0, rel=0.05)
     assert fit.parameter("backlash.damping").value == pytest.approx(0.05, abs=0.02)
     assert fit.parameter("backlash.hertz").value < 0.1
+
+
+@pytest.mark.parametrize(
+    ("machine", "seed"),
+    [
+        (GapMachine(gap=5.6, contact=646.0, damping=0.03, share=0.56, fs=1000.0), 7),
+        (GapMachine(gap=7.4, contact=678.0, damping=0.38, share=0.51, motor_rubs=0.2, fs=1000.0), 1),
+    ],
+    ids=["a few counts", "behind a motor that rubs"],
+)
+def test_a_gap_is_named_at_a_low_sampling_rate(machine: GapMachine, seed: int) -> None:
+    """Motion extends up to Nyquist there, and is no noise, and friction that explains most of the error does not hide the gap."""
+    found = diagnose(machine.fs, *driven(machine, seed))
+    assert "backlash" in found.effects
+    assert found.final.parameter("backlash.gap").value == pytest.approx(machine.gap * machine.count, rel=0.1)
 
 
 def test_the_answer_is_the_same_in_other_units() -> None:

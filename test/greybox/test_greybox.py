@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.signal
 from scipy.signal import butter, sosfilt
 
 from xy_sim.effect_text import with_effects
@@ -169,6 +170,14 @@ def test_the_encoder_is_read_from_the_data() -> None:
     assert count_size(x) == 0.0
     noisy = x + 2e-6 * np.random.default_rng(0).standard_normal(x.size)
     assert encoder_noise(RATE, noisy) == pytest.approx(2e-6, rel=0.1)
+    assert encoder_noise(RATE, np.round(noisy / 5e-7) * 5e-7) == pytest.approx(2e-6, rel=0.1)
+
+
+def test_motion_up_to_nyquist_is_no_noise() -> None:
+    """Its level falls from band to band, that of white noise does not: then only the count is left for the encoder."""
+    speed = scipy.signal.lfilter([1.0], [1.0, -0.9], np.random.default_rng(2).standard_normal(20_000))
+    position = 20.0 * 5e-7 * np.cumsum(speed) / np.std(speed)
+    assert encoder_noise(RATE, np.round(position / 5e-7) * 5e-7) == pytest.approx(5e-7 / np.sqrt(12.0), rel=1e-6)
 
 
 def test_the_same_data_give_the_same_fit_bit_for_bit() -> None:

@@ -186,15 +186,15 @@ def test_what_pulls_back_with_the_sine_of_an_angle_is_a_weight_and_no_wave() -> 
     assert not contains(STANDARD, frozenset({"gravity"}), frozenset({"cogging"}))
 
 
-def test_no_gap_is_looked_for_where_friction_explains_most_of_the_error() -> None:
-    """Noise on the input keeps the error above the floor: the answer is still the friction, and no set with a gap is tested."""
+def test_friction_stays_the_answer_where_noise_keeps_the_error_above_the_floor() -> None:
+    """Noise on the input is no gap: one is looked for, and not found."""
     voltage, position = recorded("coulomb_friction", seconds=20.0).axis("x")
     noisy = voltage + 0.05 * float(np.std(voltage)) * np.random.default_rng(4).normal(size=voltage.size)
     tried: list[frozenset[str]] = []
     found = refine(prepare(2000.0, noisy, position), trying=tried.append)
     assert found.effects == ("coulomb_friction",)
     assert found.final is not None and found.final.excess > AT_FLOOR
-    assert tried and not any("backlash" in names for names in tried)
+    assert any("backlash" in names for names in tried)
 
 
 def test_a_quick_fit_tells_how_near_a_set_comes_by_the_first_set() -> None:
