@@ -175,7 +175,7 @@ def test_the_encoder_is_read_from_the_data() -> None:
 
 def test_motion_up_to_nyquist_is_no_noise() -> None:
     """Its level falls from band to band, that of white noise does not: then only the count is left for the encoder."""
-    speed = scipy.signal.lfilter([1.0], [1.0, -0.9], np.random.default_rng(2).standard_normal(20_000))
+    speed = scipy.signal.lfilter(*scipy.signal.butter(2, 0.3), np.random.default_rng(2).standard_normal(20_000))
     position = 20.0 * 5e-7 * np.cumsum(speed) / np.std(speed)
     assert encoder_noise(RATE, np.round(position / 5e-7) * 5e-7) == pytest.approx(5e-7 / np.sqrt(12.0), rel=1e-6)
 
