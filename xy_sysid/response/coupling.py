@@ -173,9 +173,10 @@ def coupling_of(
     if alike > ALIKE:
         act = "Give each axis a signal of its own (seed); with multisines, add a second recording in which one of them is negated."
         raise BadInput("inputs of the two axes", f"alike (coherence {alike:.2f})", f"less than {ALIKE}", act)
-    inverse, between = np.linalg.inv(suu[used]), syu[used]
-    response = between @ inverse
-    explained = response.real * between.real + response.imag * between.imag  # (lines, output, input): summed over inputs, power of each output
+    inverse: ComplexArray = np.asarray(np.linalg.inv(suu[used]), dtype=np.complex128)
+    between = syu[used]
+    response: ComplexArray = between @ inverse
+    explained: FloatArray = np.real(response * between.conj())  # (lines, output, input): summed over the inputs, the power of each output
     left = _diagonal(syy)[used] - (explained[:, :, 0] + explained[:, :, 1])
     sigma = np.sqrt(np.maximum(left[:, :, None] * _diagonal(inverse)[:, None, :], 0.0) / max(spectra.averages - 2.0, 1.0))
     if differenced:
