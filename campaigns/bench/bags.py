@@ -2,8 +2,8 @@
 
 The reference is the plain loop with rosbags: read, deserialize, take the numbers. Of the time to stream
 blocks, a third is the kernel's copying of the file out of its cache. Our recorder writes sqlite3 files in pages of 32 KB,
-``ros2 bag`` in sqlite's usual 4 KB. Streams of sqlite3 include the check of our recorder's sums. Joint states
-with effort are numbered one by one while they are streamed, as the nodes do.
+``ros2 bag`` in sqlite's usual 4 KB. Streams of sqlite3 include the check of our recorder's sums, for which the file is
+read once more before the first sample is passed on. Joint states with effort are numbered while they are streamed, as the nodes do.
 """
 
 from __future__ import annotations
