@@ -11,7 +11,7 @@ from helpers.live_streams import AXES, blocks, last, recorded
 from xy_sim.machine import Machine
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.choose_orders import Choice, choose
-from xy_sysid.fitting.structure import Structure
+from xy_sysid.fitting.structure import FitOptions, Structure
 from xy_sysid.live import fitter
 from xy_sysid.live.fitter import LiveFitter, Update
 from xy_sysid.live.identifier import FitRequest, Identifier
@@ -167,8 +167,8 @@ def test_orders_are_searched_once_while_new_data_only_confirm_them(paper: Record
     """At the fits 1, 2, 4, 8, ... the choice is judged again in a few ms; the slow search runs at the first fit of each axis only."""
     searched: list[Choice] = []
 
-    def counted(frf: FrequencyResponse, family: Structure, thorough: bool) -> Choice:
-        searched.append(choose(frf, family, thorough))
+    def counted(frf: FrequencyResponse, family: Structure, thorough: bool, options: FitOptions) -> Choice:
+        searched.append(choose(frf, family, thorough, options))
         return searched[-1]
 
     monkeypatch.setattr(fitter, "choose", counted)

@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput
+from xy_sysid.jit import compiled
 from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.response.h1 import divisor
 from xy_sysid.response.windows import WindowShape, error_correlation
@@ -120,22 +122,32 @@ class RunningCrossSpectra:
 
     def __init__(self, shape: WindowShape) -> None:
         """shape: of the windows."""
-        self._taper = shape.taper()[:, None]
+        self._taper = shape.taper()
         self._sums = np.zeros((3, shape.length // 2 + 1, 2, 2), dtype=np.complex128)
         self._count = 0
         self._shared = 1.0 + 2.0 * float(np.sum(error_correlation(shape)[1:, 0]))
 
     def update(self, inputs: FloatArray, outputs: FloatArray) -> None:
         """Add one window: (length, 2) of inputs and of outputs, positions differenced."""
-        one, other = (np.fft.rfft((signal - signal.mean(axis=0)) * self._taper, axis=0) for signal in (inputs, outputs))
-        for total, first, second in zip(self._sums, (one, other, other), (one, one, other), strict=True):
-            total += first[:, :, None] * second[:, None, :].conj()
+        rows = np.concatenate((inputs.T, outputs.T))
+        _add_products(self._sums, np.fft.rfft((rows - rows.mean(axis=1, keepdims=True)) * self._taper))
         self._count += 1
 
     def get(self) -> CrossSpectra:
         """The sums so far."""
         inputs, between, outputs = self._sums
         return CrossSpectra(inputs=inputs, between=between, outputs=outputs, averages=self._count / self._shared, windows=self._count)
+
+
+@compiled
+def _add_products(sums: NDArray[np.complex128], spectra: NDArray[np.complex128]) -> None:
+    """Add U U*, Y U* and Y Y* of one window to the sums; spectra: (4, lines), both inputs, then both outputs."""
+    for k in range(spectra.shape[1]):
+        for i in range(2):
+            for j in range(2):
+                sums[0, k, i, j] += spectra[i, k] * spectra[j, k].conjugate()
+                sums[1, k, i, j] += spectra[2 + i, k] * spectra[j, k].conjugate()
+                sums[2, k, i, j] += spectra[2 + i, k] * spectra[2 + j, k].conjugate()
 
 
 def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float], combine: str = "") -> Coupling:
