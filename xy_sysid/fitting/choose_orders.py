@@ -16,8 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.errors import BadInput
-from xy_sysid.fitting.identify import DEFAULTS, identify
-from xy_sysid.fitting.model_orders import CLEARLY, OrderTrial, description_length, independent_data
+from xy_sysid.fitting.damped import minimise
+from xy_sysid.fitting.identify import DEFAULTS, identify, warm
+from xy_sysid.fitting.model_orders import CLEARLY, OrderTrial, description_length, independent_data, length_of
+from xy_sysid.fitting.problem import from_transfer_function, problem
 from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
 from xy_sysid.linear.transfer_function import Mode, TransferFunction
@@ -101,9 +103,10 @@ def stands(frf: FrequencyResponse, choice: Choice, now: Fit, options: FitOptions
     data, scale = independent_data(frf, len(now.frequency)), max(1.0, excess(now))
     length = description_length(now, data, scale)
     for structure, tf in choice.others:
-        fit = identify(frf, structure, tf, options, doubt=False)
+        task = problem(frf, structure)
+        start = from_transfer_function(task, tf)
         simpler = structure.parameters < now.structure.parameters
-        if fit.converged and not length < description_length(fit, data, scale) - CLEARLY * simpler:
+        if start is None or not length < length_of(minimise(task, start, warm(options)).cost, structure, data, scale) - CLEARLY * simpler:
             return False
     return True
 
