@@ -17,7 +17,7 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.damped import minimise
-from xy_sysid.fitting.identify import DEFAULTS, identify, warm
+from xy_sysid.fitting.identify import identify, warm
 from xy_sysid.fitting.model_orders import CLEARLY, OrderTrial, description_length, independent_data, length_of
 from xy_sysid.fitting.problem import from_transfer_function, problem
 from xy_sysid.fitting.result import Fit
@@ -55,17 +55,17 @@ class _Step:
     doubt: str
 
 
-def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True, options: FitOptions = DEFAULTS) -> Choice:
+def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> Choice:
     """The orders that the data support; everything but the orders is kept from ``family``, with sigma as weight in the s domain.
 
-    thorough: test higher orders even if noise explains the residual; options: of every fit. Raises BadInput for too few lines for a rigid body.
+    thorough: test higher orders even if noise explains the residual. Raises BadInput for too few lines for a rigid body.
     """
     family = replace(family, weighting="sigma", domain="s")
-    rigid = _rigid(frf, family, options)
+    rigid = _rigid(frf, family)
     now, tried, refused = rigid, [rigid], ""
     words: list[str] = []
     while True:
-        steps = _steps(frf, now, options) if thorough or not now.consistent else []
+        steps = _steps(frf, now) if thorough or not now.consistent else []
         tried += [step.fit for step in steps]
         data = independent_data(frf, len(now.frequency))
         sure = [step.fit for step in steps if not step.doubt]
@@ -126,20 +126,20 @@ def excess(fit: Fit) -> float:
     return fit.cost / fit.expected_cost if fit.expected_cost > 0.0 else 1.0
 
 
-def _rigid(frf: FrequencyResponse, family: Structure, options: FitOptions) -> Fit:
+def _rigid(frf: FrequencyResponse, family: Structure) -> Fit:
     """A mass with drag (or on a spring, without integrators) and delay; one pole less if the last is not visible, or the fit is unstable."""
     floats = family.integrators == 2 and derivative_of(frf.output_unit) == 2  # a mass without drag responds to a force with its acceleration
     order = 2 if floats else max(2, family.integrators + 1)
-    rigid = identify(frf, replace(family, numerator_order=0, denominator_order=order), options=options)
+    rigid = identify(frf, replace(family, numerator_order=0, denominator_order=order))
     if floats:
         return rigid
     if rigid.converged and rigid.tf.is_stable and rigid.tf.pole_modes()[-1].frequency < FAR_ABOVE * rigid.frequency[-1]:
         return rigid
-    bare = identify(frf, replace(family, numerator_order=0, denominator_order=order - 1), options=options)
+    bare = identify(frf, replace(family, numerator_order=0, denominator_order=order - 1))
     return bare if bare.converged and bare.tf.is_stable and not bare.cost > NEAR * rigid.cost else rigid
 
 
-def _steps(frf: FrequencyResponse, now: Fit, options: FitOptions = DEFAULTS) -> list[_Step]:
+def _steps(frf: FrequencyResponse, now: Fit) -> list[_Step]:
     found: list[_Step] = []
     at = now.structure
     for zeros, poles in STEPS:
@@ -149,7 +149,7 @@ def _steps(frf: FrequencyResponse, now: Fit, options: FitOptions = DEFAULTS) -> 
         if independent_data(frf, len(now.frequency)) < NUMBERS_EACH * structure.parameters:
             continue
         try:
-            fit = identify(frf, structure, options=options)
+            fit = identify(frf, structure)
         except (BadInput, ZeroDivisionError, np.linalg.LinAlgError):  # outside the range of floating-point numbers
             continue
         if fit.converged:

@@ -142,7 +142,7 @@ class LiveFitter:
                 fit = identify(frf, structure, start.tf, OPTIONS, doubt=False)
                 if stands(frf, choice, fit, OPTIONS):
                     return fit
-            choice = self._choices[axis] = choose(frf, structure_from(self._settings), False, OPTIONS)
+            choice = self._choices[axis] = choose(frf, structure_from(self._settings), thorough=False)
             structure, start = choice.fit.structure, choice.fit
         doubt = number <= FIRST_FITS or number % LATER_DOUBT == 0
         return identify(frf, structure, start.tf if start else None, OPTIONS, doubt)
