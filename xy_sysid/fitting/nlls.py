@@ -10,7 +10,7 @@ import numpy as np
 from xy_sysid.fitting.damped import Minimum, minimise
 from xy_sysid.fitting.finish import finish
 from xy_sysid.fitting.linear import linear_step, reweighted, scan
-from xy_sysid.fitting.plan import Lines
+from xy_sysid.fitting.plan import PlanKey
 from xy_sysid.fitting.problem import Point, Problem, from_transfer_function, in_bases, problem, rational, rebased
 from xy_sysid.fitting.result import Ended, Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
@@ -87,7 +87,7 @@ class _Rigid:
 
     structure: Structure
     options: FitOptions
-    lines: Lines
+    lines: PlanKey
     response: bytes
     frf: FrequencyResponse = field(compare=False)
 
@@ -104,7 +104,9 @@ def _grown(task: Problem, options: FitOptions) -> Minimum:
     """The minimum from a start with the delay of a rigid axis."""
     relative = replace(task.structure, weighting="relative")
     rigid = replace(relative, numerator_order=0, denominator_order=min(relative.integrators + 1, relative.denominator_order))
-    delay = _rigid_delay(_Rigid(rigid, options, Lines.of(task.frf, rigid), task.frf.response.tobytes(), task.frf))
+    delay = _rigid_delay(
+        _Rigid(structure=rigid, options=options, lines=PlanKey.of(task.frf, rigid), response=task.frf.response.tobytes(), frf=task.frf)
+    )
     full = problem(task.frf, relative)
     better = _followed(full, delay, linear_step(full, delay, None, False), options).point
     up, down = rational(task, better)

@@ -69,7 +69,7 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True)
-class Lines:
+class PlanKey:
     """Everything that a plan depends on, as a cache key; rate, resolution: Hz."""
 
     frequency: bytes
@@ -83,9 +83,9 @@ class Lines:
     domain: str
 
     @staticmethod
-    def of(frf: FrequencyResponse, structure: Structure) -> Lines:
-        """The lines of a response."""
-        return Lines(
+    def of(frf: FrequencyResponse, structure: Structure) -> PlanKey:
+        """The key for the lines of a response."""
+        return PlanKey(
             frequency=frf.frequency.tobytes(),
             kernel_offset=frf.kernel_offset.tobytes(),
             kernel_weight=frf.kernel_weight.tobytes(),
@@ -100,11 +100,11 @@ class Lines:
 
 def plan_for(frf: FrequencyResponse, structure: Structure) -> Plan:
     """The plan for the lines of a response; cached for the last few calls."""
-    return _plan(Lines.of(frf, structure))
+    return _plan(PlanKey.of(frf, structure))
 
 
 @lru_cache(maxsize=32)
-def _plan(lines: Lines) -> Plan:
+def _plan(lines: PlanKey) -> Plan:
     frequency, offset, weight = (np.frombuffer(b, dtype=np.float64) for b in (lines.frequency, lines.kernel_offset, lines.kernel_weight))
     rate, differenced, integrators, held, domain = lines.rate, lines.differenced, lines.integrators, lines.held, lines.domain
     seen = np.abs(weight) > NO_WEIGHT * np.max(np.abs(weight))
@@ -161,7 +161,7 @@ def _variable(omega: FloatArray, period: float, scale: float, domain: str) -> Co
     return np.asarray(1j * omega / scale, dtype=np.complex128)
 
 
-def _factors(omega: FloatArray, scale: float, differenced: bool, lines: Lines) -> tuple[ComplexArray, ComplexArray]:
+def _factors(omega: FloatArray, scale: float, differenced: bool, lines: PlanKey) -> tuple[ComplexArray, ComplexArray]:
     """(main, fold) at each frequency; at 0 Hz the limit, or 0 where it is infinite (the data have no DC there)."""
     period, integrators = 1.0 / lines.rate, lines.integrators
     zero = omega == 0
