@@ -1,9 +1,10 @@
 """Speed of reading bags, compared with deserializing message by message in the same run.
 
-The reference is the plain loop with rosbags: read, deserialize, take the numbers. Of the time to stream
+The reference is the plain loop with rosbags: read, deserialize, take the numbers. Times are processor time of all threads, user and
+system, so that other work on the machine does not count. Of the time to stream
 blocks, a third is the kernel's copying of the file out of its cache. Our recorder writes sqlite3 files in pages of 32 KB,
-``ros2 bag`` in sqlite's usual 4 KB. Streams of sqlite3 include the check of our recorder's sums. Joint states
-with effort are numbered one by one while they are streamed, as the nodes do.
+``ros2 bag`` in sqlite's usual 4 KB. Streams of sqlite3 include the check of our recorder's sums, for which the file is
+read once more before the first sample is passed on. Joint states with effort are numbered while they are streamed, as the nodes do.
 """
 
 from __future__ import annotations
@@ -79,12 +80,12 @@ def stream(path: Path) -> None:
 
 
 def best(work: Callable[[Path], object], path: Path, repeats: int) -> float:
-    """Shortest of some runs, s; the first one compiles and is not counted."""
+    """Least processor time of some runs, s; the first one compiles and is not counted."""
     times = []
     for _ in range(repeats + 1):
-        begin = time.perf_counter()
+        begin = time.process_time()
         work(path)
-        times.append(time.perf_counter() - begin)
+        times.append(time.process_time() - begin)
     return min(times[1:])
 
 

@@ -10,7 +10,8 @@ from helpers.real_data import data
 import xy_sysid as xy
 from xy_sysid.cli.simulated_recording import simulate
 from xy_sysid.fitting import Structure, choose_orders, identify
-from xy_sysid.fitting.choose_orders import MOST_POLES, Choice, choose
+from xy_sysid.fitting.choose_orders import MOST_POLES, Choice, choose, stands
+from xy_sysid.fitting.structure import FitOptions
 from xy_sysid.fitting.verdicts import validate
 from xy_sysid.linear.simulate import held_response
 from xy_sysid.linear.transfer_function import TransferFunction
@@ -21,9 +22,9 @@ def orders(found: Choice) -> tuple[int, int]:
     return found.fit.structure.numerator_order, found.fit.structure.denominator_order
 
 
-def two_resonances() -> TransferFunction:
-    """The paper's machine with a second pair, at 120 and 150 Hz."""
-    one, zero, pole = paper_machine(), 2 * np.pi * 120.0, 2 * np.pi * 150.0
+def two_resonances(zero_at: float = 120.0) -> TransferFunction:
+    """The paper's machine with a second pair, its zero at ``zero_at`` Hz and its pole at 150 Hz."""
+    one, zero, pole = paper_machine(), 2 * np.pi * zero_at, 2 * np.pi * 150.0
     numerator = np.polymul(one.numerator, (pole / zero) ** 2 * np.array([1.0, 2 * 0.03 * zero, zero**2]))
     return function(numerator, np.polymul(one.denominator, [1.0, 2 * 0.03 * pole, pole**2]), one.delay)
 
@@ -46,6 +47,27 @@ def test_simulated_machines_get_their_own_orders(machine: TransferFunction, want
     checked = validate(found.fit, seen, choice=found)
     assert f"Orders {wanted[0]}/{wanted[1]}, chosen from the data" in next(item.sentence for item in checked.verdicts if item.name == "order")
     assert checked.ok
+
+
+@pytest.mark.parametrize(
+    ("machine", "before", "noise", "later", "wanted", "same"),
+    [
+        (paper_machine(), paper_machine(), 0.035, 0.025, (2, 4), True),
+        (two_resonances(), two_resonances(), 0.035, 0.025, (4, 6), True),
+        (two_resonances(145.5), two_resonances(145.5), 0.1, 0.01, (4, 6), False),
+        (paper_machine(), two_resonances(), 0.01, 0.01, (2, 4), False),
+    ],
+    ids=["one resonance", "two resonances", "a second one appears in more data", "the second one is gone"],
+)
+def test_a_choice_stands_while_a_new_search_would_repeat_it(
+    machine: TransferFunction, before: TransferFunction, noise: float, later: float, wanted: tuple[int, int], same: bool
+) -> None:
+    """The orders are searched again only if the new data ask for others; then the search finds these."""
+    first = choose(held(before, noise, seed=3), Structure(), thorough=False)
+    seen, options = held(machine, later, seed=4), FitOptions(relative_change=1e-6)
+    now = identify(seen, first.fit.structure, first.fit.tf, options, doubt=False)
+    assert stands(seen, first, now, options) == same == (orders(first) == wanted)
+    assert orders(choose(seen, Structure(), thorough=False)) == wanted
 
 
 def test_misfit_that_no_pole_explains_buys_no_orders() -> None:

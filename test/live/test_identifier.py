@@ -9,12 +9,17 @@ import pytest
 from helpers.live_streams import AXES, blocks, last, recorded
 
 from xy_sim.machine import Machine
+from xy_sysid.cli.simulated_recording import simulate
 from xy_sysid.errors import BadInput
+from xy_sysid.fitting.choose_orders import Choice, choose
+from xy_sysid.fitting.structure import Structure
+from xy_sysid.live import fitter
 from xy_sysid.live.fitter import LiveFitter, Update
 from xy_sysid.live.identifier import FitRequest, Identifier
 from xy_sysid.live.messages import read_transfer_function
 from xy_sysid.live.plain_messages import ERROR, OK
 from xy_sysid.live.replay import replay
+from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.block import Block
 from xy_sysid.samples.pairing import Quantity
 from xy_sysid.samples.recording import Recording
@@ -157,6 +162,30 @@ def test_a_saved_state_goes_on_after_a_restart(paper: Recording) -> None:
     assert requests[-1].axes["x"].windows >= 57 - 3
     fit = LiveFitter(SETTINGS).fit(requests[-1]).axes["x"].fit
     assert fit is not None and fit.relative_error < 0.015
+
+
+def test_orders_are_searched_once_while_new_data_only_confirm_them(paper: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the fits 1, 2, 4, 8, ... the choice is judged again in a few ms; the slow search runs at the first fit of each axis only."""
+    searched: list[Choice] = []
+
+    def counted(frf: FrequencyResponse, family: Structure, thorough: bool) -> Choice:
+        searched.append(choose(frf, family, thorough))
+        return searched[-1]
+
+    monkeypatch.setattr(fitter, "choose", counted)
+    updates = list(replay(blocks(paper), SETTINGS, AXES))
+    assert len(updates) > 16
+    assert len(searched) == len(AXES)
+    fits = [update.axes[axis].fit for update in updates for axis in AXES]
+    assert {(fit.structure.numerator_order, fit.structure.denominator_order) for fit in fits if fit is not None} == {(2, 4)}
+
+
+def test_orders_that_explain_the_data_are_not_lost_again() -> None:
+    """With friction a new search misses the resonance now and then, with ten times the cost; orders that noise confirms stay."""
+    updates = list(replay(blocks(simulate(60.0, effects=["coulomb_friction"])), SETTINGS, AXES))
+    fits = [update.axes[axis].fit for update in updates for axis in AXES if update.request.number >= 4]
+    assert len(fits) > 50
+    assert {(fit.structure.numerator_order, fit.structure.denominator_order) for fit in fits if fit is not None} == {(2, 4)}
 
 
 def test_a_state_of_other_settings_is_refused() -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
 from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import Block
-from xy_sysid.samples.joint_fields import joints_of
+from xy_sysid.samples.joint_fields import JointOutput, joints_of
 from xy_sysid.samples.joint_states import JointCounter
 
 
@@ -179,3 +181,35 @@ def test_cycles_that_begin_late_are_no_losses_and_losses_are_found_among_them(wi
             times += block.time.tolist()
     assert seqs == kept[: len(seqs)].tolist() and len(seqs) > 5900
     assert np.abs(np.diff(times) / np.diff(seqs) / 0.002 - 1.0).max() < 0.1
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("output", ["position", "velocity"])
+def test_samples_fed_together_are_counted_as_one_by_one(seed: int, output: JointOutput) -> None:
+    """Late cycles, losses, restarts, another rate, repeated and missing stamps, in pieces of any length: the same blocks, bit for bit."""
+    random = np.random.default_rng(seed)
+    size, period = 12_000, float(random.choice([5e-4, 2e-3, 0.02]))
+    late = np.where(random.random(size) < 0.02, random.uniform(0.2, 60.0, size), 0.0)
+    times = period * (np.maximum.accumulate(np.arange(size) + late) + random.normal(0.0, 0.05, size)) + 1e3
+    times = np.delete(times, np.arange(5000, 5000 + 7 * seed))
+    half = len(times) // 2
+    if seed % 4 == 1:
+        times[half:] -= 3.0 * seed
+    if seed % 4 == 2:
+        times[half:] = times[half] + 1.3 * (times[half:] - times[half])
+    if seed % 4 == 3:
+        times[random.integers(0, len(times), 20)] = np.nan
+        times[4001:4030] = times[4000]
+    rows = random.normal(size=(len(times), 2))
+    single, together = (JointCounter(("x",), with_voltage=False, output=output) for _ in range(2))
+    blocks = [(index, single.add(float(time), row)) for index, (time, row) in enumerate(zip(times, rows, strict=True))]
+    expected = [(index, block) for index, block in blocks if block is not None]
+    cuts = [0, *sorted(random.integers(0, len(times), 9).tolist()), len(times)]
+    found = [(first, *together.feed(times[first:last], rows[first:last])) for first, last in itertools.pairwise(cuts)]
+    assert sum(len(block) for _, block in expected) > size // 10
+    for name in ("seq", "time", "values"):
+        one, other = (np.concatenate([getattr(block, name) for block in some]) for some in ([b for _, b in expected], [b for _, b, _ in found]))
+        np.testing.assert_array_equal(one, other)
+    came = np.concatenate([np.full(len(block), index) for index, block in expected])
+    np.testing.assert_array_equal(came, np.concatenate([first + index for first, _, index in found]))
+    assert single.wrong() == together.wrong()

@@ -296,12 +296,8 @@ class _Decoder:
     def counted(self, axes: tuple[str, ...], places: Indices, time: FloatArray, rows: FloatArray) -> list[_Part]:
         """Positions and efforts with their numbers of live operation; a sample that was decided late comes at the time of the decision."""
         self.counter = self.counter or JointCounter(axes, with_voltage=False, output=self.source.output)
-        found = [(place, self.counter.add(float(at), row)) for place, at, row in zip(places.tolist(), time, rows, strict=True)]
-        blocks = [(place, block) for place, block in found if block is not None]
-        if not blocks:
-            return []
-        message = np.repeat([place for place, _ in blocks], [len(block) for _, block in blocks])
-        seq, even, values = (np.concatenate([getattr(block, name) for _, block in blocks]) for name in ("seq", "time", "values"))
+        block, index = self.counter.feed(time, rows)
+        message, seq, even, values = places[index], block.seq, block.time, block.values
         known, lag, width = seq >= self.source.lag, self.source.lag, len(axes)
         efforts = Block(axes, seq[known] - lag, even[known], values[known, width:])
         parts = [_Part("position", message, 1, Block(axes, seq, even, values[:, :width])), _Part("voltage", message[known], 1, efforts)]

@@ -10,10 +10,15 @@ import sqlite3
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, Literal
-from zlib import crc32
 
-from xy_sysid.bags.sqlite_file import files_of
+import numpy as np
+
+from xy_sysid.bags.cdr import Bytes
+from xy_sysid.bags.checksum import crc32
+from xy_sysid.bags.sqlite_file import SqliteFile, files_of
+from xy_sysid.bags.stride import Indices
 from xy_sysid.errors import BadRecording
+from xy_sysid.jit import compiled
 
 KEY = "xy_sysid_crc32"  # in custom_data of metadata.yaml: {topic: [messages, sum]} as JSON
 Checked = Literal["none", "good", "damaged"]
@@ -53,7 +58,9 @@ def check_sums(path: Path) -> Checked:
     told = _told(path)
     if not told:
         return "none"
-    found = Sums()
+    if _agree(path, told):
+        return "good"
+    found = Sums()  # SQL decides what is wrong
     try:
         for name in _databases(path):
             with closing(sqlite3.connect(f"{name.absolute().as_uri()}?mode=ro", uri=True)) as file:
@@ -69,6 +76,36 @@ def check_sums(path: Path) -> Checked:
             problem = f"the messages on {topic} are not those that were recorded (their check sum differs)"
             raise BadRecording(path, problem, f"Take another copy; to read it nevertheless, delete {KEY} in its metadata.yaml.")
     return "good" if all(found.count(topic) == count for topic, (count, _) in told.items()) else "damaged"
+
+
+def _agree(path: Path, told: dict[str, tuple[int, int]]) -> bool:
+    """True if all messages in the checksums are there, and their sums agree; much faster than SQL, as the pages are read in compiled code."""
+    found, wanted, notes = dict.fromkeys(told, (0, 0)), list(told), list[str]()
+    try:
+        for name in _databases(path):
+            with closing(SqliteFile(name, notes)) as file:
+                for batch, _ in file.batches(wanted, None):
+                    for index, topic in enumerate(wanted):
+                        count, value = found[topic]
+                        rows = np.flatnonzero(batch.topic == index)[: max(told[topic][0] - count, 0)]
+                        if rows.size:
+                            data = _joined(batch.buffer, batch.start[rows], batch.length[rows])
+                            found[topic] = count + len(rows), crc32(data.data, value)
+    except (BadRecording, sqlite3.Error, OSError):
+        return False
+    return not notes and found == told
+
+
+@compiled
+def _joined(buffer: Bytes, start: Indices, length: Indices) -> Bytes:
+    """The bytes of some messages, one after the other."""
+    out, at = np.empty(np.sum(length), np.uint8), 0
+    for row in range(start.shape[0]):
+        source, target = buffer[start[row] : start[row] + length[row]], out[at : at + length[row]]
+        for index in range(length[row]):
+            target[index] = source[index]
+        at += length[row]
+    return out
 
 
 def _databases(path: Path) -> list[Path]:

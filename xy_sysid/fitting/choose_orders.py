@@ -16,11 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xy_sysid.errors import BadInput
-from xy_sysid.fitting.identify import identify
-from xy_sysid.fitting.model_orders import CLEARLY, OrderTrial, description_length, independent_data
+from xy_sysid.fitting.damped import minimise
+from xy_sysid.fitting.identify import identify, warm
+from xy_sysid.fitting.model_orders import CLEARLY, OrderTrial, description_length, independent_data, length_of
+from xy_sysid.fitting.problem import from_transfer_function, problem
 from xy_sysid.fitting.result import Fit
-from xy_sysid.fitting.structure import Structure
-from xy_sysid.linear.transfer_function import Mode
+from xy_sysid.fitting.structure import FitOptions, Structure
+from xy_sysid.linear.transfer_function import Mode, TransferFunction
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.units import derivative_of
 
@@ -36,11 +38,12 @@ FAR_ABOVE = 3.0  # factor above the band's end beyond which a rigid body's pole 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The fit of the chosen orders, the tested structures (best first), and the reason in words."""
+    """The fit of the chosen orders, the tested structures (best first), the reason in words, and the models of the structures not chosen."""
 
     fit: Fit
     tried: tuple[OrderTrial, ...]
     reason: str
+    others: tuple[tuple[Structure, TransferFunction], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +88,27 @@ def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> 
     reason = f"Orders {_orders(now)}, chosen from the data: {base}{' with delay' if family.free_delay else ''} has {_times(rigid)}"
     reason += "".join(f"; {text}" for text in words)
     reason += f"; {refused}." if refused else f"; of {len(trials) - 1} other orders tried, none with more parameters is clearly better."
-    return Choice(now, tuple(ranked), reason)
+    others = tuple((fit.structure, fit.tf) for fit in trials.values() if fit.structure != now.structure)
+    return Choice(now, tuple(ranked), reason, others)
+
+
+def stands(frf: FrequencyResponse, choice: Choice, now: Fit, options: FitOptions) -> bool:
+    """True if a choice that was not thorough would be the same for a newer response of this axis, for which ``now`` is the fit of its orders.
+
+    This holds if noise explains the fit, so that no higher orders would be tested, and if every other structure that was tested loses again.
+    Each of these starts from its own model of that time, which takes a small part of the time of ``choose``.
+    """
+    if not (now.converged and now.consistent and choice.others):
+        return False
+    data, scale = independent_data(frf, len(now.frequency)), max(1.0, excess(now))
+    length = description_length(now, data, scale)
+    for structure, tf in choice.others:
+        task = problem(frf, structure)
+        start = from_transfer_function(task, tf)
+        simpler = structure.parameters < now.structure.parameters
+        if start is None or not length < length_of(minimise(task, start, warm(options)).cost, structure, data, scale) - CLEARLY * simpler:
+            return False
+    return True
 
 
 def choose_among(frf: FrequencyResponse, families: Sequence[Structure]) -> Choice:

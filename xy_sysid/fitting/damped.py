@@ -107,21 +107,44 @@ def _half_square(rows: FloatArray) -> float:
 
 def triangle(rows: FloatArray) -> FloatArray:
     """(p + 1, p + 1) upper triangular factor R of the table."""
-    factors = lapack.dgeqrf(rows.T)[0]
-    return np.asarray(np.triu(factors[: rows.shape[0]]))
+    upper: FloatArray = _upper(lapack.dgeqrf(rows.T)[0], rows.shape[0])
+    return upper
+
+
+@compiled
+def _upper(factors: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """(size, size) upper triangle of LAPACK's factors."""
+    out = np.zeros((min(size, factors.shape[0]), size))
+    for i in range(out.shape[0]):
+        for j in range(i, size):
+            out[i, j] = factors[i, j]
+    return out
 
 
 def _factor(task: Problem, rows: FloatArray, at: Point) -> tuple[FloatArray, FloatArray]:
     """(R of the scaled table, scales); a delay at its bound is fixed if the step would leave the bounds."""
     upper = triangle(rows)
-    scale = np.sqrt(np.sum(upper[:, :-1] ** 2, axis=0))
-    scale[~(scale > 0)] = 1.0
-    upper[:, :-1] /= scale
+    scale = _scaled(upper)
     if task.structure.free_delay and (at.delay <= 0.0 or at.delay >= task.structure.delay_max):
         pull = float(upper[:, -2] @ upper[:, -1])
         if (at.delay <= 0.0 and pull < 0) or (at.delay >= task.structure.delay_max and pull > 0):
             upper[:, -2] = 0.0
     return upper, scale
+
+
+@compiled
+def _scaled(upper: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lengths of the columns but the last, by which they are divided in place; 1 for a column of zeros."""
+    scale = np.ones(upper.shape[1] - 1)
+    for j in range(scale.shape[0]):
+        total = 0.0
+        for i in range(upper.shape[0]):
+            total += upper[i, j] * upper[i, j]
+        if total > 0.0:
+            scale[j] = np.sqrt(total)
+            for i in range(upper.shape[0]):
+                upper[i, j] /= scale[j]
+    return scale
 
 
 @compiled
@@ -164,5 +187,5 @@ def _moved(task: Problem, at: Point, step: FloatArray) -> Point:
     split = at.b.size
     a = at.a.copy()
     a[:-1] += step[split : split + a.size - 1]
-    delay = float(np.clip(at.delay + step[-1], 0.0, task.structure.delay_max)) if task.structure.free_delay else at.delay
+    delay = min(max(at.delay + float(step[-1]), 0.0), task.structure.delay_max) if task.structure.free_delay else at.delay
     return moved(at, at.b + step[:split], a, delay)

@@ -71,4 +71,9 @@ def _fitted(frf: FrequencyResponse, structure: Structure) -> Fit | None:
 
 def description_length(fit: Fit, data: float, scale: float = 1.0) -> float:
     """Description length, nats; data: number of independent real data; scale: least cost of any model relative to that of noise alone."""
-    return fit.cost / scale + 0.5 * fit.structure.parameters * math.log(max(data, 2.0))
+    return length_of(fit.cost, fit.structure, data, scale)
+
+
+def length_of(cost: float, structure: Structure, data: float, scale: float = 1.0) -> float:
+    """Description length of a structure with this cost, nats; data, scale: see ``description_length``."""
+    return cost / scale + 0.5 * structure.parameters * math.log(max(data, 2.0))

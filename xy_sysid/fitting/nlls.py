@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
 from xy_sysid.fitting.damped import Minimum, minimise
 from xy_sysid.fitting.finish import finish
 from xy_sysid.fitting.linear import linear_step, reweighted, scan
+from xy_sysid.fitting.plan import PlanKey
 from xy_sysid.fitting.problem import Point, Problem, from_transfer_function, in_bases, problem, rational, rebased
 from xy_sysid.fitting.result import Ended, Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
@@ -79,12 +81,32 @@ def _followed(task: Problem, delay: float, start: Point, options: FitOptions) ->
     return minimise(task, rebased(task, point), options)
 
 
+@dataclass(frozen=True, slots=True)
+class _Rigid:
+    """Everything that the delay of a rigid axis depends on, as a cache key; ``frf`` is described by lines and response."""
+
+    structure: Structure
+    options: FitOptions
+    lines: PlanKey
+    response: bytes
+    frf: FrequencyResponse = field(compare=False)
+
+
+@lru_cache(maxsize=8)
+def _rigid_delay(asked: _Rigid) -> float:
+    """Delay of a rigid axis, s; cached, as a search for the orders needs it for each of them."""
+    task = problem(asked.frf, asked.structure)
+    _, first, start = scan(task, asked.options.reweightings, asked.options)[0]
+    return _followed(task, first, start, asked.options).point.delay
+
+
 def _grown(task: Problem, options: FitOptions) -> Minimum:
     """The minimum from a start with the delay of a rigid axis."""
     relative = replace(task.structure, weighting="relative")
-    rigid = problem(task.frf, replace(relative, numerator_order=0, denominator_order=min(relative.integrators + 1, relative.denominator_order)))
-    _, first, start = scan(rigid, options.reweightings, options)[0]
-    delay = _followed(rigid, first, start, options).point.delay
+    rigid = replace(relative, numerator_order=0, denominator_order=min(relative.integrators + 1, relative.denominator_order))
+    delay = _rigid_delay(
+        _Rigid(structure=rigid, options=options, lines=PlanKey.of(task.frf, rigid), response=task.frf.response.tobytes(), frf=task.frf)
+    )
     full = problem(task.frf, relative)
     better = _followed(full, delay, linear_step(full, delay, None, False), options).point
     up, down = rational(task, better)

@@ -17,6 +17,8 @@ from xy_sysid.linear.hold import ALIASES, TAIL_POINTS, interpolation, nodes_for
 from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.samples.block import FloatArray
 
+STEPS = 1e5  # of the grid in one line; frequencies less than a step apart are one point
+PART = 1e3  # steps: points that differ by whole lines, to within this, follow one another on the grid, so that sums over lines are fast
 NO_WEIGHT = 1e-15  # weights of the window below this fraction of the largest are rounding errors
 
 
@@ -34,6 +36,7 @@ class Plan:
     main:        (g,) factor of N / D exp(-j w delay) at the grid
     fold:        (g,) factor of the sum of aliases at the grid
     index:       (j, m) rows of the grid for each line (near 0 Hz the window reaches below it)
+    runs:        first line of each run of lines whose rows follow one another, and the number of lines
     kernel:      (j,) weights of the window; seen: (j,) their indices in FrequencyResponse.kernel_weight
     after:       (m,) factor of the smoothed response: 1 over the response of the difference
     alias:       (nodes * 2 ALIASES,) scaled s of the aliases, grouped by node; alias_omega: rad/s
@@ -53,6 +56,7 @@ class Plan:
     main: ComplexArray
     fold: ComplexArray
     index: NDArray[np.int64]
+    runs: NDArray[np.int64]
     kernel: FloatArray
     seen: NDArray[np.int64]
     after: ComplexArray
@@ -64,25 +68,8 @@ class Plan:
     tail: FloatArray
 
 
-def plan_for(frf: FrequencyResponse, structure: Structure) -> Plan:
-    """The plan for the lines of a response; cached for the last few calls."""
-    return _plan(
-        _Lines(
-            frequency=frf.frequency.tobytes(),
-            kernel_offset=frf.kernel_offset.tobytes(),
-            kernel_weight=frf.kernel_weight.tobytes(),
-            rate=frf.sampling_rate,
-            resolution=frf.resolution,
-            differenced=frf.differenced,
-            integrators=structure.power,
-            held=structure.hold == "zoh" and structure.domain == "s",
-            domain=structure.domain,
-        )
-    )
-
-
 @dataclass(frozen=True, slots=True)
-class _Lines:
+class PlanKey:
     """Everything that a plan depends on, as a cache key; rate, resolution: Hz."""
 
     frequency: bytes
@@ -95,9 +82,29 @@ class _Lines:
     held: bool
     domain: str
 
+    @staticmethod
+    def of(frf: FrequencyResponse, structure: Structure) -> PlanKey:
+        """The key for the lines of a response."""
+        return PlanKey(
+            frequency=frf.frequency.tobytes(),
+            kernel_offset=frf.kernel_offset.tobytes(),
+            kernel_weight=frf.kernel_weight.tobytes(),
+            rate=frf.sampling_rate,
+            resolution=frf.resolution,
+            differenced=frf.differenced,
+            integrators=structure.power,
+            held=structure.hold == "zoh" and structure.domain == "s",
+            domain=structure.domain,
+        )
+
+
+def plan_for(frf: FrequencyResponse, structure: Structure) -> Plan:
+    """The plan for the lines of a response; cached for the last few calls."""
+    return _plan(PlanKey.of(frf, structure))
+
 
 @lru_cache(maxsize=32)
-def _plan(lines: _Lines) -> Plan:
+def _plan(lines: PlanKey) -> Plan:
     frequency, offset, weight = (np.frombuffer(b, dtype=np.float64) for b in (lines.frequency, lines.kernel_offset, lines.kernel_weight))
     rate, differenced, integrators, held, domain = lines.rate, lines.differenced, lines.integrators, lines.held, lines.domain
     seen = np.abs(weight) > NO_WEIGHT * np.max(np.abs(weight))
@@ -107,9 +114,12 @@ def _plan(lines: _Lines) -> Plan:
     period = 1.0 / rate
     scale = float(np.median(2 * np.pi * frequency)) if domain == "s" else 1.0
     wanted = frequency[:, None] + offset[None, :]
-    step = max(lines.resolution, 1e-6 * float(np.max(frequency))) * 1e-5
-    _, first, inverse = np.unique(np.rint(wanted / step).astype(np.int64), return_index=True, return_inverse=True)
-    grid_frequency = wanted.ravel()[first]
+    step = max(lines.resolution, 1e-6 * float(np.max(frequency))) / STEPS
+    steps, first, inverse = np.unique(np.rint(wanted / step).astype(np.int64), return_index=True, return_inverse=True)
+    order = np.lexsort((steps, np.rint(steps / PART) % (STEPS / PART))) if offset.size > 1 else np.arange(steps.size)
+    index = np.ascontiguousarray(np.argsort(order)[inverse].reshape(wanted.shape).T).astype(np.int64)
+    breaks = 1 + np.flatnonzero(np.any(np.diff(index, axis=1) != 1, axis=0))
+    grid_frequency = wanted.ravel()[first][order]
     grid_frequency[np.abs(grid_frequency) < step] = 0.0
     omega, line_omega = 2 * np.pi * grid_frequency, 2 * np.pi * frequency
     main, fold = _factors(omega, scale, differenced, lines)
@@ -131,7 +141,8 @@ def _plan(lines: _Lines) -> Plan:
         omega=omega,
         main=main,
         fold=fold,
-        index=np.ascontiguousarray(inverse.reshape(wanted.shape).T).astype(np.int64),
+        index=index,
+        runs=np.concatenate(([0], breaks, [frequency.size])),
         kernel=np.ascontiguousarray(weight),
         seen=np.flatnonzero(seen),
         after=after,
@@ -150,7 +161,7 @@ def _variable(omega: FloatArray, period: float, scale: float, domain: str) -> Co
     return np.asarray(1j * omega / scale, dtype=np.complex128)
 
 
-def _factors(omega: FloatArray, scale: float, differenced: bool, lines: _Lines) -> tuple[ComplexArray, ComplexArray]:
+def _factors(omega: FloatArray, scale: float, differenced: bool, lines: PlanKey) -> tuple[ComplexArray, ComplexArray]:
     """(main, fold) at each frequency; at 0 Hz the limit, or 0 where it is infinite (the data have no DC there)."""
     period, integrators = 1.0 / lines.rate, lines.integrators
     zero = omega == 0

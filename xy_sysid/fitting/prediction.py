@@ -18,6 +18,7 @@ from xy_sysid.linear.hold import ALIASES, SERIES, TAIL_POINTS, tail_sums
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
+LONG = 8  # mean number of lines of a run from which a loop over each run is faster than one that looks up every row
 TAIL_REACH = 0.5  # the series in 1 / s is used if every pole is within this fraction of the last alias
 
 
@@ -75,8 +76,8 @@ def predict(model: Model, b: FloatArray, a: FloatArray, delay: float) -> Complex
 def unblurred(model: Model, b: FloatArray, a: FloatArray, delay: float) -> ComplexArray:
     """(g,) predicted response on the grid, before smoothing by the window."""
     plan = model.plan
-    rows = np.arange(plan.omega.size)[None, :]
-    bare = replace(model, plan=replace(plan, index=rows, kernel=np.ones(1), after=np.ones(plan.omega.size, dtype=np.complex128)))
+    rows, runs = np.arange(plan.omega.size)[None, :], np.array([0, plan.omega.size])
+    bare = replace(model, plan=replace(plan, index=rows, runs=runs, kernel=np.ones(1), after=np.ones(plan.omega.size, dtype=np.complex128)))
     return predict(bare, b, a, delay)
 
 
@@ -93,7 +94,7 @@ def _lines(model: Model, b: FloatArray, a: FloatArray, delay: float, jacobian: b
     plan = model.plan
     return _predict(
         b, a, delay, jacobian, model.integrators, plan.scale, plan.period, plan.omega, plan.main, plan.fold,
-        plan.index, plan.kernel, plan.after, plan.alias_omega, plan.alias_factor, plan.alias_number, plan.spread, plan.tail,
+        plan.index, plan.runs, plan.kernel, plan.after, plan.alias_omega, plan.alias_factor, plan.alias_number, plan.spread, plan.tail,
         model.numerator_grid, model.denominator_grid, model.numerator_alias, model.denominator_alias,
         model.numerator_top, model.denominator_top,
     )  # fmt: skip
@@ -205,10 +206,31 @@ def _tail(
 
 
 @compiled
+def _smooth(
+    out: NDArray[np.float64], values: NDArray[np.float64], index: NDArray[np.int64], runs: NDArray[np.int64], kernel: NDArray[np.float64]
+) -> None:
+    """Add to each line the weighted values on its rows of the grid: run by run, in loops that the compiler can vectorise, if the runs are long."""
+    if runs.shape[0] > out.shape[0] // LONG:
+        for j in range(kernel.shape[0]):
+            weight = kernel[j]
+            for i in range(out.shape[0]):
+                out[i] += weight * values[index[j, i]]
+        return
+    for r in range(runs.shape[0] - 1):
+        first, size = runs[r], runs[r + 1] - runs[r]
+        to = out[first : first + size]
+        for j in range(kernel.shape[0]):
+            weight, row = kernel[j], index[j, first]
+            own = values[row : row + size]
+            for i in range(size):
+                to[i] += weight * own[i]
+
+
+@compiled
 def _predict(
     b: NDArray[np.float64], a: NDArray[np.float64], delay: float, jacobian: bool, integrators: int, scale: float, period: float,
     omega: NDArray[np.float64], main: NDArray[np.complex128], fold: NDArray[np.complex128],
-    index: NDArray[np.int64], kernel: NDArray[np.float64], after: NDArray[np.complex128],
+    index: NDArray[np.int64], runs: NDArray[np.int64], kernel: NDArray[np.float64], after: NDArray[np.complex128],
     alias_omega: NDArray[np.float64], alias_factor: NDArray[np.complex128], alias_number: NDArray[np.float64],
     spread: NDArray[np.float64], tail: NDArray[np.float64],
     n_grid: NDArray[np.float64], d_grid: NDArray[np.float64], n_alias: NDArray[np.float64], d_alias: NDArray[np.float64],
@@ -257,10 +279,7 @@ def _predict(
     out = np.zeros((width, 2, lines))
     for c in range(width):
         for part in range(2):
-            for j in range(kernel.shape[0]):
-                weight = kernel[j]
-                for i in range(lines):
-                    out[c, part, i] += weight * rows[c, part, index[j, i]]
+            _smooth(out[c, part], rows[c, part], index, runs, kernel)
         for i in range(lines):
             real, imag = out[c, 0, i], out[c, 1, i]
             out[c, 0, i] = real * after[i].real - imag * after[i].imag

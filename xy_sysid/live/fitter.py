@@ -13,10 +13,10 @@ import numpy as np
 
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import identify
-from xy_sysid.fitting.choose_orders import choose
+from xy_sysid.fitting.choose_orders import Choice, choose, stands
 from xy_sysid.fitting.modes import pole_estimates
 from xy_sysid.fitting.result import Fit, Interval
-from xy_sysid.fitting.structure import FitOptions, Structure, structure_from
+from xy_sysid.fitting.structure import FitOptions, structure_from
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.coupling_messages import coupling_messages, coupling_status
 from xy_sysid.live.identifier import AxisRequest, FitRequest
@@ -88,7 +88,7 @@ class LiveFitter:
     def __init__(self, settings: IdentifierSettings, baseline: Mapping[str, TransferFunction] | None = None) -> None:
         self._settings = settings
         self._stretches = StretchFits(settings, baseline or {}, OPTIONS)
-        self._structures: dict[str, Structure] = {}
+        self._choices: dict[str, Choice] = {}
         self._last: dict[str, Fit] = {}
         self._tracks: dict[str, Track] = {}
 
@@ -98,7 +98,7 @@ class LiveFitter:
 
     def reset(self) -> None:
         """Forget models and references."""
-        self._structures.clear()
+        self._choices.clear()
         self._last.clear()
         self._tracks.clear()
 
@@ -121,15 +121,8 @@ class LiveFitter:
 
     def _axis(self, axis: str, asked: AxisRequest, number: int) -> AxisUpdate:
         track = self._tracks.get(axis, Track())
-        start = self._last.get(axis)
-        structure = self._structures.get(axis, structure_from(self._settings))
         try:
-            if self._settings.orders_from_data and number & (number - 1) == 0:  # 1, 2, 4, 8, ...: twice the data may support a higher order
-                found = choose(asked.frf, structure_from(self._settings), thorough=False).fit
-                structure = self._structures[axis] = found.structure
-                start = found
-            doubt = number <= FIRST_FITS or number % LATER_DOUBT == 0
-            fit = identify(asked.frf, structure, start.tf if start else None, OPTIONS, doubt)
+            fit = self._fit(axis, asked.frf, number)
         except BadInput as problem:
             return AxisUpdate(frf=asked.frf, fit=None, track=track, windows=asked.windows, dropped=asked.dropped, problem=str(problem))
         if fit.converged:
@@ -139,6 +132,20 @@ class LiveFitter:
         self._tracks[axis] = track
         stretch = self._stretches.fit(axis, asked)
         return AxisUpdate(frf=asked.frf, fit=fit, track=track, windows=asked.windows, dropped=asked.dropped, stretch=stretch)
+
+    def _fit(self, axis: str, frf: FrequencyResponse, number: int) -> Fit:
+        """The fit from the last model; at the fits 1, 2, 4, 8, ... its orders are judged again, as twice the data may support others."""
+        start, choice = self._last.get(axis), self._choices.get(axis)
+        structure = choice.fit.structure if choice is not None else structure_from(self._settings)
+        if self._settings.orders_from_data and number & (number - 1) == 0:
+            if choice is not None and start is not None:
+                fit = identify(frf, structure, start.tf, OPTIONS, doubt=False)
+                if stands(frf, choice, fit, OPTIONS):
+                    return fit
+            choice = self._choices[axis] = choose(frf, structure_from(self._settings), thorough=False)
+            structure, start = choice.fit.structure, choice.fit
+        doubt = number <= FIRST_FITS or number % LATER_DOUBT == 0
+        return identify(frf, structure, start.tf if start else None, OPTIONS, doubt)
 
     def _recent(self, asked: AxisRequest, fit: Fit, track: Track) -> Resonance | None:
         if asked.recent is None or not fit.converged:

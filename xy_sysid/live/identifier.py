@@ -68,6 +68,7 @@ class Identifier:
     """Pairs samples, cuts windows, updates spectra; ``feed`` returns the fits that are due."""
 
     _both: RunningCrossSpectra | None  # of the first two axes
+    _coupled: tuple[tuple[int, float, tuple[float, float]], Coupling | None] | None  # the newest coupling, and its windows, rate and band, Hz
 
     def __init__(self, settings: IdentifierSettings, axes: tuple[str, ...], units: Units = USUAL) -> None:
         if not axes:
@@ -182,7 +183,7 @@ class Identifier:
         self._said["rate_changed"] = f"the source came back at {rate:.6g} Hz, before it was {before:.6g} Hz; the spectra are restarted"
         self._rate, self._samples, self._slot, self._line = rate, 0, -1, StampLine()
         self._main, self._recent, self._used = {}, {}, Counter()
-        self._both = None if self._both is None else RunningCrossSpectra(self._long)
+        self._both, self._coupled = None if self._both is None else RunningCrossSpectra(self._long), None
         return rate
 
     def _gap(self, gap: Gap) -> list[FitRequest]:
@@ -223,6 +224,7 @@ class Identifier:
         judged = len(self.axes) > 1 and self.settings.response == "h1" and self.settings.differenced
         self._long = WindowShape.of(self.settings.window, LONGER * self.settings.length, self.settings.overlap)
         self._both = RunningCrossSpectra(self._long) if judged else None
+        self._coupled = None
         self._long_windower = Windower(self._long, len(self.axes), 1)
         self._long_windows: deque[Window] = deque()
 
@@ -234,13 +236,18 @@ class Identifier:
                 self._both.update(window.voltage[:, :2], np.diff(window.position[:, :2], axis=0))
 
     def _coupling(self, rate: float) -> Coupling | None:
+        """The coupling from all long windows; computed again only if it can differ."""
         if self._both is None:
             return None
-        band = self.settings.band_low, self.settings.band_high
-        try:
-            return coupling_of(self._both.get(), self._long, rate, band, (self.axes[0], self.axes[1]), True)
-        except BadInput:
-            return None
+        band, spectra = (self.settings.band_low, self.settings.band_high), self._both.get()
+        asked = spectra.windows, rate, band
+        if self._coupled is None or self._coupled[0] != asked:
+            try:
+                found = coupling_of(spectra, self._long, rate, band, (self.axes[0], self.axes[1]), True)
+            except BadInput:
+                found = None
+            self._coupled = asked, found
+        return self._coupled[1]
 
     def _start_spectra(self, rate: float) -> None:
         memory = self.settings.memory

@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput
+from xy_sysid.jit import compiled
 from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.response.h1 import divisor
 from xy_sysid.response.windows import WindowShape, error_correlation
@@ -120,22 +122,32 @@ class RunningCrossSpectra:
 
     def __init__(self, shape: WindowShape) -> None:
         """shape: of the windows."""
-        self._taper = shape.taper()[:, None]
+        self._taper = shape.taper()
         self._sums = np.zeros((3, shape.length // 2 + 1, 2, 2), dtype=np.complex128)
         self._count = 0
         self._shared = 1.0 + 2.0 * float(np.sum(error_correlation(shape)[1:, 0]))
 
     def update(self, inputs: FloatArray, outputs: FloatArray) -> None:
         """Add one window: (length, 2) of inputs and of outputs, positions differenced."""
-        one, other = (np.fft.rfft((signal - signal.mean(axis=0)) * self._taper, axis=0) for signal in (inputs, outputs))
-        for total, first, second in zip(self._sums, (one, other, other), (one, one, other), strict=True):
-            total += first[:, :, None] * second[:, None, :].conj()
+        rows = np.concatenate((inputs.T, outputs.T))
+        _add_products(self._sums, np.fft.rfft((rows - rows.mean(axis=1, keepdims=True)) * self._taper))
         self._count += 1
 
     def get(self) -> CrossSpectra:
         """The sums so far."""
         inputs, between, outputs = self._sums
         return CrossSpectra(inputs=inputs, between=between, outputs=outputs, averages=self._count / self._shared, windows=self._count)
+
+
+@compiled
+def _add_products(sums: NDArray[np.complex128], spectra: NDArray[np.complex128]) -> None:
+    """Add U U*, Y U* and Y Y* of one window to the sums; spectra: (4, lines), both inputs, then both outputs."""
+    for k in range(spectra.shape[1]):
+        for i in range(2):
+            for j in range(2):
+                sums[0, k, i, j] += spectra[i, k] * spectra[j, k].conjugate()
+                sums[1, k, i, j] += spectra[2 + i, k] * spectra[j, k].conjugate()
+                sums[2, k, i, j] += spectra[2 + i, k] * spectra[2 + j, k].conjugate()
 
 
 def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float], combine: str = "") -> Coupling:
@@ -161,7 +173,7 @@ def coupling_of(
     suu, syu, syy = spectra.inputs, spectra.between, spectra.outputs
     every = np.arange(suu.shape[0]) * rate / shape.length
     used = np.flatnonzero((every > 2 * rate / shape.length) & (every >= band[0]) & (every <= band[1]))
-    power = np.real(np.einsum("kii->ki", suu))
+    power = _diagonal(suu)
     if used.size and bool(np.all(power[used].max(axis=0) > 0.0)):
         used = used[np.all(power[used] > 1e-3 * np.quantile(power[used], 0.9, axis=0), axis=1)]
     else:
@@ -173,10 +185,12 @@ def coupling_of(
     if alike > ALIKE:
         act = "Give each axis a signal of its own (seed); with multisines, add a second recording in which one of them is negated."
         raise BadInput("inputs of the two axes", f"alike (coherence {alike:.2f})", f"less than {ALIKE}", act)
-    inverse = np.linalg.inv(suu[used])
-    response = np.einsum("kij,kjl->kil", syu[used], inverse)
-    left = np.real(np.einsum("kii->ki", syy[used] - np.einsum("kij,klj->kil", response, syu[used].conj())))
-    sigma = np.sqrt(np.maximum(left[:, :, None] * np.real(np.einsum("kii->ki", inverse))[:, None, :], 0.0) / max(spectra.averages - 2.0, 1.0))
+    inverse: ComplexArray = np.asarray(np.linalg.inv(suu[used]), dtype=np.complex128)
+    between = syu[used]
+    response: ComplexArray = between @ inverse
+    explained: FloatArray = np.real(response * between.conj())  # (lines, output, input): summed over the inputs, the power of each output
+    left = _diagonal(syy)[used] - (explained[:, :, 0] + explained[:, :, 1])
+    sigma = np.sqrt(np.maximum(left[:, :, None] * _diagonal(inverse)[:, None, :], 0.0) / max(spectra.averages - 2.0, 1.0))
     if differenced:
         step = divisor(every[used], rate)[:, None, None]
         response, sigma = response / step, sigma / np.abs(step)
@@ -194,6 +208,11 @@ def coupling_of(
         seconds=seconds,
         needed=seconds * max(float(np.max(most)) / SUFFICES, 1.0) ** 2,  # the limit falls with the square root of the number of windows
     )
+
+
+def _diagonal(matrices: ComplexArray) -> FloatArray:
+    """(lines, 2) real parts of the diagonals of (lines, 2, 2)."""
+    return np.asarray(matrices.real[:, (0, 1), (0, 1)])
 
 
 def single(found: Coupling, output: int, driven: int, recording: Recording) -> FrequencyResponse:
@@ -234,18 +253,21 @@ def _by_band(frequency: FloatArray, response: ComplexArray, sigma: FloatArray) -
     """Edges (b + 1,) Hz, coupling and its 95 % limit (b,): rms over the lines of each band, minus the contribution of noise."""
     edges = np.geomspace(frequency[0], frequency[-1] * (1 + 1e-9), BANDS + 1)
     place = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, BANDS - 1)
-    there = np.unique(place)
+    there, first, lines = np.unique(place, return_index=True, return_counts=True)
+
+    def mean(values: FloatArray) -> FloatArray:
+        """Mean over the lines of each band; the lines of a band follow one another."""
+        return np.asarray(np.add.reduceat(values, first) / lines)
+
+    square = response.real**2 + response.imag**2
+    own = np.sqrt(mean(square[:, 0, 0]) * mean(square[:, 1, 1]))  # mean: an antiresonance is no coupling
     size, most = np.zeros(there.size), np.zeros(there.size)
-    for k, band in enumerate(there):
-        inside = place == band
-        own = np.sqrt(np.prod([np.mean(np.abs(response[inside, i, i]) ** 2) for i in (0, 1)]))  # mean: an antiresonance is no coupling
-        for i, j in ((0, 1), (1, 0)):
-            power = float(np.mean(np.abs(response[inside, i, j]) ** 2) / own)
-            noise = float(np.mean(sigma[inside, i, j] ** 2) / own)
-            real = max(power - noise, 0.0)
-            spread = np.sqrt((noise**2 + 2.0 * noise * real) / max(inside.sum() / 2.0, 1.0))  # neighbouring lines are correlated by half
-            size[k] = max(size[k], np.sqrt(max(power - noise - 2.0 * spread, 0.0)))
-            most[k] = max(most[k], np.sqrt(real + 2.0 * spread))
+    for i, j in ((0, 1), (1, 0)):
+        power, noise = mean(square[:, i, j]) / own, mean(sigma[:, i, j] ** 2) / own
+        real = np.maximum(power - noise, 0.0)
+        spread = np.sqrt((noise**2 + 2.0 * noise * real) / np.maximum(lines / 2.0, 1.0))  # neighbouring lines are correlated by half
+        size = np.maximum(size, np.sqrt(np.maximum(power - noise - 2.0 * spread, 0.0)))
+        most = np.maximum(most, np.sqrt(real + 2.0 * spread))
     return np.append(edges[there], edges[there[-1] + 1]), size, most
 
 

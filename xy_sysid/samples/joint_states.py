@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xy_sysid.jit import compiled
 from xy_sysid.samples.block import Block, FloatArray
@@ -24,6 +25,7 @@ SAME_RATE = 0.01  # relative difference allowed between the rates of voltage and
 CATCHING_UP = 0.2  # relative difference allowed between the step over long stretches and the median step
 LOOK, FEW_LOOK, MANY_LOOK = 2.0, RATE_SAMPLES // 2, 40_000  # s of stamps, and least and largest number, between two checks of the rate
 OTHER_RATE = 1.01  # factor by which their counted and their mean step must both differ: losses change only the mean, bursts only the count
+PIECE = 4096  # stamps that ``feed`` looks through at once
 COUNTED = 3  # iterations of the step: stamps are counted with it, and a line through them gives the next
 STICKS = 0.8  # samples by which a sample may deviate from its voltage sample before it is assigned to another
 STILL = 20  # consecutive messages with one stamp after which they count as unstamped
@@ -158,6 +160,58 @@ class JointCounter:
         waiting, self._early = self._early, []
         return self._count(waiting)
 
+    def feed(self, times: FloatArray, rows: FloatArray) -> tuple[Block, NDArray[np.int64]]:
+        """Add samples as ``add`` does, one after the other; returns all their blocks as one, and the index of the sample that each row came with.
+
+        times: (n,) s; rows: (n, numbers)
+        """
+        found: list[tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]] = []
+        begin = 0
+        while begin < len(times):
+            end = begin + self._plain(times[begin : begin + PIECE])
+            if end > begin:
+                found.append(self._stretch(begin, times[begin:end], rows[begin:end]))
+            else:
+                block, end = self.add(float(times[begin]), rows[begin]), begin + 1
+                if block is not None:
+                    found.append((np.full(len(block), begin), block.seq, block.time, block.values))
+            begin = end
+        if not found:
+            found.append((np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, rows.shape[1]))))
+        index, seq, time, values = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return Block(self._axes, seq, time, values), index
+
+    def _plain(self, times: FloatArray) -> int:
+        """Number of the next stamps that only continue the count: without a restart of the source, a new look at the rate, or voltage or velocity."""
+        if self._rate is None or self._counter is None or self._with_voltage or self._path is not None:
+            return 0
+        latest = np.maximum.accumulate(np.concatenate(([self._latest], times)))[:-1]
+        later = times > latest
+        count = len(self._since) + np.cumsum(later)
+        since = self._since[0] if self._since else times[np.argmax(later)]
+        look = later & (count >= FEW_LOOK) & ((times - since >= LOOK) | (count >= MANY_LOOK))
+        other = look | ~np.isfinite(times) | (times < latest - RESTART)
+        return int(np.argmax(other)) if other.any() else len(times)
+
+    def _stretch(self, begin: int, times: FloatArray, rows: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
+        """(index of the deciding sample, from ``begin``, counter, instant, row) of each sample that is decided by these plain ones."""
+        assert self._counter is not None
+        steps = np.diff(times, prepend=self._newest)
+        moves, backs = np.flatnonzero(steps != 0.0), np.flatnonzero(steps < 0.0)
+        self._still = len(times) - 1 - int(moves[-1]) if moves.size else self._still + len(times)
+        if backs.size:
+            self._stamps.clear()
+        self._stamps.extend(times[backs[-1] if backs.size else 0 :].tolist())
+        self._newest = float(times[-1])
+        decided = self._counter.feed(times)
+        self._since += times[decided.used].tolist()
+        self._latest = max(self._latest, float(np.max(times)))
+        waiting = np.concatenate((np.reshape(np.array(self._undecided), (-1, rows.shape[1])), rows[decided.used]))
+        done = len(decided.number)
+        self._undecided = deque(waiting[done:])
+        known = decided.number >= 0
+        return begin + decided.at[known], decided.number[known].astype(np.float64), decided.instant[known], waiting[:done][known]
+
     def _learn(self) -> None:
         times = np.array([time for time, _ in self._early])
         steps = np.diff(times)
@@ -198,12 +252,12 @@ class JointCounter:
                 self._counter, self._offset = StampCounter(1.0 / self._rate), None
                 self._undecided.clear()
                 seqs, times, rows = [], [], []
-            decided = self._counter.add(time)
-            if decided is None:
+            decided = self._counter.feed(np.array([time]))
+            if not decided.used[0]:
                 continue
             self._latest = time
             self._undecided.append(row)
-            for number, instant in decided:
+            for number, instant in zip(decided.number.tolist(), decided.instant.tolist(), strict=True):
                 seq, row_of_it = self._place(number, instant), self._undecided.popleft()
                 if seq >= 0 and not (seqs and seq <= seqs[-1]):
                     seqs.append(seq)
