@@ -10,7 +10,7 @@ PART = Part(
     kind="friction",
     group="added",
     law="f = share |u| sign(v), where u is the voltage of the drive; at rest it holds up to share |u|",
-    meaning="flanks of a gear, a worm or a harmonic drive that rub harder while they transmit more",
+    meaning="gear, worm or harmonic drive: its teeth have more friction the more they transmit",
     source="Duclusaud, Passault, Padois & Ly, Extended friction models, arXiv:2410.08650, 2024; switching as for Coulomb friction",
     parameters=(Parameter("share", "", 0.15, 0.08, 0.3, "friction as a fraction of the drive voltage", 0.0, 0.9),),
 )
