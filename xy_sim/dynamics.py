@@ -22,6 +22,7 @@ from xy_sim.parts import (
     gain_drift,
     gravity,
     hardening_stiffness,
+    load_dependent_friction,
     loose_mode,
     position_dependent_drag,
     position_dependent_gain,
@@ -50,6 +51,7 @@ _STRIBECK, _STRIBECK_COULOMB, _STRIBECK_V = slot("stribeck_friction.excess"), sl
 _SIDED = slot("asymmetric_viscous_friction.asymmetry")
 _ASYM, _ASYM_COULOMB = slot("asymmetric_friction.asymmetry"), slot("asymmetric_friction.coulomb")
 _PRE, _PRE_LENGTH, _PRE_DAMPING = slot("presliding_hysteresis.coulomb"), slot("presliding_hysteresis.length"), slot("presliding_hysteresis.damping")
+_LOADED = slot("load_dependent_friction.share")
 _COG, _COG_PHASE = slot("cogging.amplitude"), slot("cogging.phase")
 _LOAD, _CUBIC, _LINEAR = slot("constant_load.load"), slot("hardening_stiffness.cubic"), slot("hardening_stiffness.linear")
 _WEIGHT, _WEIGHT_PHASE = slot("gravity.amplitude"), slot("gravity.phase")
@@ -63,35 +65,51 @@ _DROP, _DROP_START, _DROP_RATE = slot("base_loosening.drop"), slot("base_looseni
 
 
 @inlined
-def dry_level(p: FloatArray, v: float, direction: float) -> float:
-    """Size of all dry friction at speed ``v``, sliding in ``direction`` (+1 or -1), V."""
+def at_the_motor(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, dirt: FloatArray | None) -> float:
+    """Voltage that acts on the motor, V, for ``volts`` at the input of the amplifier; row ``i`` of ``y`` is the state."""
+    if p[_LAG] > 0.0:
+        volts = y[i, VOLTS]
+    if p[_DRIFT] != 0.0:
+        volts *= gain_drift.factor(p[_DRIFT], p[_DRIFT_LIMIT], t)
+    if p[_GAIN_DEPTH] != 0.0:
+        volts *= position_dependent_gain.factor(p[_GAIN_DEPTH], p[_GAIN_WAVE], y[i, MOTOR])
+    if dirt is not None:
+        volts = volts * imperfections.gain_and_drag(dirt, t, y[i, MOTOR])[0] + imperfections.hum(dirt, t)
+    return volts
+
+
+@inlined
+def dry_level(p: FloatArray, v: float, direction: float, volts: float) -> float:
+    """Size of all dry friction at speed ``v``, sliding in ``direction`` (+1 or -1), with ``volts`` at the motor, V."""
     level: float = coulomb_friction.level(p[_COULOMB]) + asymmetric_friction.level(p[_ASYM], p[_ASYM_COULOMB], direction)
     level += stribeck_friction.level(p[_STRIBECK], p[_STRIBECK_COULOMB], p[_STRIBECK_V], v) + p[_PRE]
+    if p[_LOADED] != 0.0:
+        level += load_dependent_friction.level(p[_LOADED], volts)
     return level
 
 
 @inlined
-def breakaway(p: FloatArray, t: float, direction: float, dirt: FloatArray | None) -> float:
-    """Friction that must be overcome to start in ``direction`` at ``t`` (s), N."""
-    level: float = p[_FORCE] * dry_level(p, 0.0, direction)
+def breakaway(p: FloatArray, t: float, direction: float, volts: float, dirt: FloatArray | None) -> float:
+    """Friction that must be overcome to start in ``direction`` at ``t`` (s) with ``volts`` at the motor, N."""
+    level: float = p[_FORCE] * dry_level(p, 0.0, direction, volts)
     if dirt is not None:
         level *= imperfections.friction(dirt, t)
     return level
 
 
 @inlined
-def slide_length(p: FloatArray, v: float) -> float:
-    """Steady bristle deflection when sliding at speed ``v``, m."""
-    length: float = p[_PRE_LENGTH] * dry_level(p, v, 1.0 if v >= 0.0 else -1.0) / p[_PRE]
+def slide_length(p: FloatArray, v: float, volts: float) -> float:
+    """Steady bristle deflection when sliding at speed ``v`` with ``volts`` at the motor, m."""
+    length: float = p[_PRE_LENGTH] * dry_level(p, v, 1.0 if v >= 0.0 else -1.0, volts) / p[_PRE]
     return length
 
 
 @inlined
 def longest_step(p: FloatArray, v: float, step: float) -> float:
-    """The inner step (s), shortened if the bristles deflect too fast for it at speed ``v``."""
+    """The inner step (s), shortened if the bristles deflect too fast for it at speed ``v``, also without a voltage."""
     if p[_PRE] == 0.0:
         return step
-    return min(step, presliding_hysteresis.longest_step(v, slide_length(p, v)))
+    return min(step, presliding_hysteresis.longest_step(v, slide_length(p, v, 0.0)))
 
 
 @inlined
@@ -176,10 +194,10 @@ def rates(p: FloatArray, y: FloatArray, i: int, t: float, volts: float, mode: in
         on_table += link
 
     if p[_PRE] > 0.0:
-        y[o, BRISTLE] = presliding_hysteresis.rate(y[i, BRISTLE], v, slide_length(p, v))
+        y[o, BRISTLE] = presliding_hysteresis.rate(y[i, BRISTLE], v, slide_length(p, v, volts))
         on_motor -= k * rub * (p[_PRE] / p[_PRE_LENGTH] * y[i, BRISTLE] + p[_PRE_DAMPING] * y[o, BRISTLE])
     elif mode == 1 or mode == -1:
-        on_motor -= mode * k * dry_level(p, v, float(mode)) * rub
+        on_motor -= mode * k * dry_level(p, v, float(mode), volts) * rub
 
     on_base = 0.0
     base = p[_BASE_MASS]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sim import imperfections
-from xy_sim.dynamics import FREE, breakaway, longest_step, rates, regime, slide_length
+from xy_sim.dynamics import FREE, at_the_motor, breakaway, longest_step, rates, regime, slide_length
 from xy_sim.inlined import inlined
 from xy_sim.layout import BASE, BRISTLE, MOTOR, MOTOR_SPEED, RATTLE, SECOND_WEAK, TABLE, TABLE_SPEED, WEAK, slot
 from xy_sim.parts import dead_zone, lead_error, saturation, time_delay
@@ -59,7 +59,8 @@ def _broken_loose(p: FloatArray, y: FloatArray, row: int, t: float, volts: float
     """0 if dry friction can hold a motor at rest in state ``row``, else the direction in which it starts to move."""
     needed = rates(p, y, row, t, volts, 0, _K1, dirt)
     direction = 1 if needed > 0.0 else -1
-    return direction if abs(needed) > breakaway(p, t, float(direction), dirt) else 0
+    acting = at_the_motor(p, y, row, t, volts, dirt)
+    return direction if abs(needed) > breakaway(p, t, float(direction), acting, dirt) else 0
 
 
 @inlined
@@ -104,7 +105,7 @@ def _first_order(p: FloatArray, y: FloatArray, n: int, t: float, dt: float, volt
             y[_NOW, i] += dt * dt * y[_K1, i + 1]  # with the new speed
     speed = y[_NOW, MOTOR_SPEED]
     if p[_PRE] > 0.0:  # implicit: bristles are stiff
-        y[_NOW, BRISTLE] = (bristle + dt * speed) / (1.0 + dt * abs(speed) / slide_length(p, speed))
+        y[_NOW, BRISTLE] = (bristle + dt * speed) / (1.0 + dt * abs(speed) / slide_length(p, speed, at_the_motor(p, y, _NOW, t, volts, dirt)))
     if (mode == 1 or mode == -1) and speed * mode < 0.0:
         y[_NOW, MOTOR_SPEED] = 0.0
         mode = 0

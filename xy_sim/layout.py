@@ -55,7 +55,7 @@ def numbers(drive: Drive, parts: Mapping[str, Mapping[str, float]]) -> FloatArra
             row[name] = 2.0 * math.pi * parts[part]["per_revolution"] / drive.lead
     if "position_dependent_gain" in parts:
         row["gain_wavenumber"] = 2.0 * math.pi / parts["position_dependent_gain"]["period"]
-    dry = any(name in parts for name in ("coulomb_friction", "stribeck_friction", "asymmetric_friction"))
+    dry = any(name in parts for name in ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "load_dependent_friction"))
     row["dry"] = float(dry and "presliding_hysteresis" not in parts)
     for name in _CURVED:
         if name in parts:

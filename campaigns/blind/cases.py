@@ -38,6 +38,7 @@ EFFECTS = (
 )
 FURTHER = (  # laws that came later; gravity is drawn on the axes and joints of MuJoCo
     "asymmetric_viscous_friction",
+    "load_dependent_friction",
     "load_side_resonance",
     "position_dependent_drag",
     "position_dependent_gain",

@@ -77,6 +77,12 @@ EXAMPLES = (
         "because the force follows the distance since the last reversal and not the sign of the velocity.",
     ),
     Example(
+        "load_dependent_friction",
+        (FREQUENCY, SPEED, ZOOM),
+        "By frequency the error is flat up to the pole of the axis, as with Coulomb friction. But against velocity the mean error is small and has "
+        "hardly a jump at standstill, because the friction is as large as the input, which can have any value there.",
+    ),
+    Example(
         "asymmetric_friction",
         (FREQUENCY, SPEED, TIME),
         "A jump as with Coulomb friction, around a mean that is not zero: friction is larger in one direction, which acts like a load while "

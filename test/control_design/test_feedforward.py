@@ -105,6 +105,19 @@ def test_what_differs_by_direction_and_what_a_load_holds_have_gains_of_their_own
     assert held == pytest.approx([0.5 * math.sin(x) for x in (0.3, 2.0)])
 
 
+def test_friction_that_grows_with_the_input_makes_every_gain_larger() -> None:
+    """Of the voltage only 1 - share drives the axis: kS, kV and kA are divided by it, and hold a speed with Coulomb friction."""
+    share, coulomb = (STANDARD[name].typical[0] for name in ("load_dependent_friction", "coulomb_friction"))
+    both = gains(known("load_dependent_friction", "coulomb_friction"))
+    assert both["kS"].value == pytest.approx(coulomb / (1.0 - share))
+    assert both["kV"].value == pytest.approx(1.0 / (GAIN * (1.0 - share)))
+    assert both["kA"].value == pytest.approx(1.0 / (GAIN * POLE * (1.0 - share)))
+    assert {item.name for item in both.items} == {"kS", "kV", "kA"}
+    voltage = np.full(1000, both["kS"].value + 0.05 * both["kV"].value)
+    position = simulate_alone(axis("load_dependent_friction", "coulomb_friction"), RATE, voltage)
+    assert (position[-1] - position[-2]) * RATE == pytest.approx(0.05, rel=1e-6)
+
+
 def test_a_number_that_the_data_do_not_determine_says_so() -> None:
     """A gain with an uncertainty above a factor of two, or without an interval, is marked."""
     wide = gains(known("coulomb_friction", coulomb_friction__coulomb=1.5))["kS"]

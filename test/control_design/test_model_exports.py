@@ -41,6 +41,7 @@ RATE = 2000.0
 ALL = [effect.name for effect in STANDARD.acting if effect.name != "load_side_resonance"]
 MIXED = ("base_resonance", "coulomb_friction", "cogging", "lead_error", "saturation", "amplifier_lag")
 LOST = {"asymmetric_viscous_friction", "backlash", "dead_zone", "gain_drift", "lead_error", "position_dependent_drag", "position_dependent_gain"}
+LOST |= {"load_dependent_friction"}
 
 
 def noise(count: int = 500) -> FloatArray:

@@ -42,7 +42,9 @@ def diagnosed(effect: str, seconds: float = 20.0) -> Answer:
     return diagnose(2000.0, *recorded(effect, seconds=seconds).axis("x"))
 
 
-@pytest.mark.parametrize("effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error"])
+@pytest.mark.parametrize(
+    "effect", ["coulomb_friction", "cogging", "dead_zone", "constant_load", "saturation", "lead_error", "load_dependent_friction"]
+)
 def test_the_missing_effect_is_named_and_the_error_falls_to_the_floor(effect: str) -> None:
     """The first name is right and confident, the held-out error within 5 % of the noise, and nearly all of the error's power is explained."""
     found = diagnosed(effect, 30.0)
@@ -69,6 +71,14 @@ def test_two_effects_are_both_named() -> None:
     found, _ = two_effects()
     assert found.verdict == "missing_effect"
     assert set(found.effects) == {"coulomb_friction", "cogging"}
+
+
+def test_friction_of_the_gear_is_named_beside_friction_of_the_guide() -> None:
+    """Both levels add up; the one grows with the input, the other stays."""
+    found = diagnosed("coulomb_friction+load_dependent_friction")
+    assert set(found.effects) == {"coulomb_friction", "load_dependent_friction"}, found.sentence
+    assert found.final.parameter("load_dependent_friction.share").value == pytest.approx(0.15, rel=0.02)
+    assert found.final.parameter("coulomb_friction.coulomb").value == pytest.approx(0.2, rel=0.02)
 
 
 def test_what_was_found_comes_first_and_what_is_left_is_said() -> None:

@@ -31,7 +31,7 @@ BASE = AxisModel(0.097, 1.29e-3, 246.0)
 NAMES = names("""time_delay viscous_friction coulomb_friction stribeck_friction presliding_hysteresis asymmetric_friction
 constant_load dead_zone saturation amplifier_lag backlash cogging lead_error screw_compliance base_resonance
 load_side_resonance hardening_stiffness gain_drift position_dependent_gain asymmetric_viscous_friction gravity return_spring
-position_dependent_drag quadratic_drag""")
+position_dependent_drag quadratic_drag load_dependent_friction""")
 ACTING = [name for name in EFFECTS if EFFECTS[name].category != "base"]
 
 
@@ -176,6 +176,13 @@ def test_a_weight_is_not_looked_for_where_it_is_a_load_and_a_spring() -> None:
         scene = Scene(RATE, BASE.gain, BASE.pole, u[:-1], still, np.linspace(2.0, 2.0 + reach, x.size - 1), still)
         guesses = EFFECTS["gravity"].guesses
         assert guesses is not None and len(list(guesses(scene))) == traces
+
+
+def test_friction_that_holds_only_with_a_drive_is_not_counted_as_dry_friction() -> None:
+    """Every machine has dry friction, but not one that grows with the input."""
+    assert {name for name in ACTING if EFFECTS[name].is_of_the_input} == {"load_dependent_friction"}
+    dry = {"coulomb_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis"}
+    assert {name for name in ACTING if EFFECTS[name].is_dry} == dry
 
 
 def test_a_frequency_that_is_no_parameter_is_refused() -> None:

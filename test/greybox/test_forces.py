@@ -10,7 +10,7 @@ import pytest
 from xy_sysid.axis.model import STANDARD, AxisModel
 from xy_sysid.effects import Scene
 from xy_sysid.greybox.axis_data import AxisData, prepare
-from xy_sysid.greybox.forces import force_moved_to_others, force_of, position_forces, with_equal_force, with_force_from_trace
+from xy_sysid.greybox.forces import force_moved_to_others, force_of, friction_of, position_forces, with_equal_force, with_force_from_trace
 
 RATE = 1000.0
 
@@ -64,6 +64,17 @@ def test_coulomb_friction_stands_in_for_stribeck_with_the_base_taking_what_falls
     for speed in (0.005, 0.01, 0.02):
         before = law(excess=0.02, coulomb=0.25, velocity=0.1, v=speed) + speed / abs(gain)
         assert level + speed / abs(found.gain) == pytest.approx(before, rel=3e-3)
+
+
+@pytest.mark.parametrize("gain", [0.1, -0.1])
+def test_friction_that_grows_with_the_input_follows_the_measured_one(gain: float) -> None:
+    """Its force is a share of the input's size, against the motion, whatever the sign of the gain."""
+    random = np.random.default_rng(3)
+    velocity, voltage, still = np.sin(np.arange(2000) / 50.0), random.standard_normal(2000), np.zeros(2000)
+    scene = Scene(RATE, gain, 100.0, voltage, velocity, still, still)
+    force = friction_of(scene, AxisModel(gain, 1e-3, 100.0).with_effect("load_dependent_friction", (0.3,)), "load_dependent_friction")
+    fast = np.abs(velocity) > 0.1
+    assert force[fast] == pytest.approx((0.3 * np.abs(voltage) * np.sign(velocity) * np.sign(gain))[fast], rel=1e-3)
 
 
 def test_a_level_that_is_the_same_at_all_speeds_stays(data: AxisData) -> None:

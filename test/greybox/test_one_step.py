@@ -146,14 +146,15 @@ def test_nothing_is_put_beside_backlash_that_stands_alone() -> None:
 
 
 def test_a_dead_zone_can_be_added_to_backlash_by_name() -> None:
-    """The gap is kept, the dead zone gets its width; an effect that depends on speed cannot be removed, with an error."""
+    """The gap is kept, the dead zone gets its width; effects that depend on speed, or friction that depends on the input, are refused."""
     data, base = machine("backlash=30e-6", "dead_zone=0.15")
     alone = one_step_fit(data, base, EFFECTS["backlash"])
     both = with_one_more(data, STANDARD, base, alone, "dead_zone")
     assert both.held_out_error < 0.5 * alone.held_out_error
     assert both.parameter("dead_zone.width").value == pytest.approx(0.15, rel=0.05)
-    with pytest.raises(BadInput, match="asymmetric_viscous_friction"):
-        with_one_more(data, STANDARD, base, alone, "asymmetric_viscous_friction")
+    for name in ("asymmetric_viscous_friction", "load_dependent_friction"):
+        with pytest.raises(BadInput, match=f"effects is backlash with {name}; allowed: backlash with dry friction"):
+            with_one_more(data, STANDARD, base, alone, name)
 
 
 @pytest.mark.parametrize(

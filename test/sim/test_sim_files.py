@@ -22,6 +22,7 @@ DESIGN = {"time_delay", "viscous_friction", *EFFECTS}
 MORE = {
     "asymmetric_viscous_friction",
     "gravity",
+    "load_dependent_friction",
     "return_spring",
     "position_dependent_drag",
     "position_dependent_gain",

@@ -51,6 +51,8 @@ def test_steady_speed_is_gain_times_voltage(machine: str, volts: float) -> None:
         ("presliding_hysteresis", {"coulomb": 0.3}, 1.0, 0.3),
         ("asymmetric_friction", {"asymmetry": 0.5, "coulomb": 0.2}, 1.0, 0.3),
         ("asymmetric_friction", {"asymmetry": 0.5, "coulomb": 0.2}, -1.0, -0.1),
+        ("load_dependent_friction", {"share": 0.2}, 1.0, 0.2),
+        ("load_dependent_friction", {"share": 0.2}, -2.0, -0.4),
         ("constant_load", {"load": 0.3}, 0.0, 0.3),
         ("constant_load", {"load": -0.3}, 1.0, -0.3),
         ("dead_zone", {"width": 0.2}, 1.0, 0.2),
@@ -79,6 +81,15 @@ def test_nothing_moves_below_breakaway(name: str, values: dict[str, float], hold
     more: dict[str, Any] = {"base_resonance": {}} if on_base else {}
     assert not positions(rigid(**{name: values}, **more), 0.999 * holds).any()
     assert positions(rigid(**{name: values}, **more), 1.001 * holds)[-1] > 0.0
+
+
+def test_friction_that_grows_with_the_drive_adds_to_what_holds_the_table() -> None:
+    """It holds while u <= coulomb + share u; the amplifier's lag comes before it."""
+    others: tuple[dict[str, Any], ...] = ({}, {"amplifier_lag": {}})
+    for more in others:
+        parts: dict[str, Any] = {"load_dependent_friction": {"share": 0.2}, "coulomb_friction": {"coulomb": 0.3}, **more}
+        assert not positions(rigid(**parts), 0.999 * 0.3 / 0.8).any()
+        assert positions(rigid(**parts), 1.001 * 0.3 / 0.8)[-1] > 0.0
 
 
 def test_coulomb_friction_stops_a_coasting_table_for_good() -> None:
@@ -298,7 +309,7 @@ def test_every_part_says_what_it_is(name: str) -> None:
     assert part.law and part.meaning and part.source
     for item in part.parameters:
         assert item.minimum <= item.default <= item.maximum and item.low <= item.high
-        assert item.meaning and (item.unit or item.name in {"damping", "depth", "per_revolution", "asymmetry", "limit", "seed"})
+        assert item.meaning and (item.unit or item.name in {"damping", "depth", "per_revolution", "asymmetry", "limit", "seed", "share"})
     u = np.random.default_rng(0).standard_normal((4000, 2))
     plain = Machine.from_file("paper.yaml", clean=True)
     with_it = plain.with_parts({name: {"start": 1.0} if name == "base_loosening" else {}})

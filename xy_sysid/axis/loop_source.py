@@ -62,6 +62,8 @@ def _loop(name: str, effects: Sequence[Effect], how: Mapping[str, str], encoders
         unpack=_unpack(effects),
         flags=_flags(effects),
         levels=_levels(effects),
+        loaded=_loaded(effects, 5),
+        loaded_cut=_loaded(effects, 6),
         slopes=_slopes(effects),
         states=_states(effects),
         pulls=_pulls(effects),
@@ -127,7 +129,7 @@ def _asks_where(effect: Effect) -> bool:
 
 def heeds_speed(effect: Effect) -> bool:
     """True if the law depends on speed: then a resonance must be in the loop with it."""
-    if effect.is_dry:
+    if effect.category in ("friction", "bristle"):
         return True
     return effect.category in ("force", "state") and any("v" in arguments(item) for item in effect.functions.values())
 
@@ -160,6 +162,7 @@ def _flags(effects: Sequence[Effect]) -> str:
         "any_pull": [effect for effect in _of(effects, "force") if not needs_speed(effect)],
         "placed": [effect for effect in effects if _asks_where(effect)],
         "dry": _of(effects, "friction"),
+        "loaded": [effect for effect in effects if effect.is_of_the_input],
         "bristled": _of(effects, "bristle"),
     }
     lines += [f"inside_{effect.name} = False" for effect in _of(effects, "motion")]
@@ -176,16 +179,26 @@ def _inputs(effects: Sequence[Effect]) -> str:
 
 
 def _levels(effects: Sequence[Effect]) -> str:
-    """Friction levels at rest, in both directions, and their part that does not depend on speed."""
-    lines = []
+    """Friction levels at rest, in both directions, and their part that does not depend on speed; without levels that depend on the voltage."""
+    return _lines(1, [line for effect in _of(effects, "friction") if not effect.is_of_the_input for line in _added(effect, {})])
+
+
+def _loaded(effects: Sequence[Effect], depth: int) -> str:
+    """The same levels under the present voltage, with those that depend on it."""
+    lines = ["fixed_forth, fixed_back, rest_forth, rest_back = unloaded"]
     for effect in _of(effects, "friction"):
-        lines.append(f"if has_{effect.name}:")
-        for side, direction in (("forth", "1.0"), ("back", "-1.0")):
-            value = _call(effect, "level", {"v": "0.0", "direction": direction})
-            lines.append(f"    rest_{side} += {value}")
-            if not needs_speed(effect):
-                lines.append(f"    fixed_{side} += {value}")
-    return _lines(1, lines)
+        lines += _added(effect, {"u": "drive"}) if effect.is_of_the_input else []
+    return _lines(depth, lines)
+
+
+def _added(effect: Effect, words: Mapping[str, str]) -> list[str]:
+    lines = [f"if has_{effect.name}:"]
+    for side, direction in (("forth", "1.0"), ("back", "-1.0")):
+        value = _call(effect, "level", {**words, "v": "0.0", "direction": direction})
+        lines.append(f"    rest_{side} += {value}")
+        if not needs_speed(effect):
+            lines.append(f"    fixed_{side} += {value}")
+    return lines
 
 
 def _slopes(effects: Sequence[Effect]) -> str:
@@ -238,7 +251,7 @@ def _drags(effects: Sequence[Effect], speed: str, depth: int) -> str:
 
 
 def _moving_levels(effects: Sequence[Effect], speed: str) -> str:
-    words = {"v": speed, "direction": "direction"}
+    words = {"u": "drive", "v": speed, "direction": "direction"}
     lines = []
     for effect in _of(effects, "friction"):
         if needs_speed(effect):

@@ -22,6 +22,7 @@ $places
 $inputs
     rest_forth = rest_back = fixed_forth = fixed_back = 0.0
 $levels
+    unloaded = fixed_forth, fixed_back, rest_forth, rest_back
     slope_forth = slope_back = 0.0
 $slopes
 $states
@@ -74,6 +75,8 @@ $pulls
                     drive = volts
                     if any_state:
 $advance
+                    if loaded:
+$loaded_cut
                     net = drive - pull
                     drag = 0.0
 $drag_start
@@ -135,7 +138,10 @@ $level_middle
                 if h <= 0.0:
                     continue
                 k = i - whole - 1 + piece
-                volts = held[k] if k >= 0 else 0.0
+                drive = volts = held[k] if k >= 0 else 0.0
+                if loaded:
+$loaded
+                    levels = (fixed_forth, fixed_back) if gain > 0.0 else (fixed_back, fixed_forth)
                 push = volts
                 if any_pull:
                     time = (i + middle_of) / fs
@@ -199,6 +205,8 @@ $pulls
                     drive = volts
                     if any_state:
 $advance
+                    if loaded:
+$loaded_cut
                     net = drive - pull
                     drag = 0.0
 $drag_start

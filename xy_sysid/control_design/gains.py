@@ -14,7 +14,7 @@ import numpy as np
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.laws import ask, asks, force, friction, of_category
+from xy_sysid.control_design.laws import ask, asks, driving_factor, force, friction, of_category
 from xy_sysid.control_design.path import SampledPath
 from xy_sysid.control_design.uncertain import Derived, derive, is_determined, is_known_angle
 from xy_sysid.samples.block import FloatArray
@@ -55,23 +55,29 @@ def gains(model: PhysicalModel, speed: float | None = None) -> Gains:
     way = math.copysign(1.0, model.model.gain)
 
     def rubs(of: AxisModel, direction: float) -> float:
-        return friction(of, direction * usual, direction)
+        return friction(of, direction * usual, direction) / driving_factor(of)
+
+    def starts(of: AxisModel) -> float:
+        return friction(of, 0.0, 1.0) / driving_factor(of)
+
+    def drags(of: AxisModel, speed: float) -> float:
+        return (1.0 / of.gain + speed * force(of, speed, 0.0, of_speed=True)) / driving_factor(of)
 
     found = [
         derive(model, "kS", "V", "dry friction while sliding, mean of both directions", lambda of: way * 0.5 * (rubs(of, 1.0) + rubs(of, -1.0))),
-        derive(model, "kV", "V/(m/s)", "holds a speed", lambda of: 1.0 / of.gain),
-        derive(model, "kA", "V/(m/s2)", "accelerates the mass", lambda of: 1.0 / (of.gain * of.pole)),
+        derive(model, "kV", "V/(m/s)", "holds a speed", lambda of: 1.0 / (of.gain * driving_factor(of))),
+        derive(model, "kA", "V/(m/s2)", "accelerates the mass", lambda of: 1.0 / (of.gain * of.pole * driving_factor(of))),
     ]
     centre = model.model
     if abs(rubs(centre, 1.0) - rubs(centre, -1.0)) > 1e-9 * (rubs(centre, 1.0) + 1e-12):
         found.append(derive(model, "kS forth", "V", "dry friction while sliding forth", lambda of: way * rubs(of, 1.0)))
         found.append(derive(model, "kS back", "V", "dry friction while sliding back", lambda of: way * rubs(of, -1.0)))
-    if abs(friction(centre, 0.0, 1.0) - rubs(centre, 1.0)) > 1e-6 * (rubs(centre, 1.0) + 1e-12):
-        found.append(derive(model, "breakaway", "V", "dry friction that is overcome from rest", lambda of: way * friction(of, 0.0, 1.0)))
-    drags = [force(centre, side, 0.0, of_speed=True) for side in (1.0, -1.0)]
-    if abs(drags[0] + drags[1]) > 1e-12:
-        found.append(derive(model, "kV forth", "V/(m/s)", "holds a speed forth", lambda of: 1.0 / of.gain + force(of, 1.0, 0.0, of_speed=True)))
-        found.append(derive(model, "kV back", "V/(m/s)", "holds a speed back", lambda of: 1.0 / of.gain - force(of, -1.0, 0.0, of_speed=True)))
+    if abs(starts(centre) - rubs(centre, 1.0)) > 1e-6 * (rubs(centre, 1.0) + 1e-12):
+        found.append(derive(model, "breakaway", "V", "dry friction that is overcome from rest", lambda of: way * starts(of)))
+    sides = [force(centre, side, 0.0, of_speed=True) for side in (1.0, -1.0)]
+    if abs(sides[0] + sides[1]) > 1e-12:
+        found.append(derive(model, "kV forth", "V/(m/s)", "holds a speed forth", lambda of: drags(of, 1.0)))
+        found.append(derive(model, "kV back", "V/(m/s)", "holds a speed back", lambda of: drags(of, -1.0)))
     if any(not asks(effect) - {"gain", "pole"} for effect, _ in of_category(centre, "force")):
         found.append(derive(model, "kG", "V", "holds the constant load", lambda of: force(of, 0.0, 0.0, of_speed=False, by_place=False)))
     if any(effect.angular for effect, _ in of_category(centre, "force")):

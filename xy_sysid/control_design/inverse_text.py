@@ -14,7 +14,7 @@ from xy_sysid.effects._contract import arguments
 
 NUDGE = 1e-6  # m: step for differentiating the encoder's error
 PASSES = 4  # iterations for a force that depends on the unknown voltage
-TRIES = 40  # iterations for an amplifier's law: enough to leave a dead zone of any width
+TRIES = 40  # iterations for an amplifier's law: enough to leave a dead zone of any width; and for friction that takes a large part of the voltage
 
 TEMPLATE = Template("""\
 def $name($signature):
@@ -90,11 +90,12 @@ class InverseText(LawText):
         return lines
 
     def _friction(self) -> list[str]:
-        """Friction levels; bristles, if there are any, use them and have a state."""
+        """Friction levels; bristles, if there are any, use them and have a state. Levels that depend on the unknown voltage are among the forces."""
         turn = self.numbers["turn"]
         lines = ["level = 0.0"]
         for effect in self.of("friction"):
-            lines += self.guard(effect, [f"level += {self.call(effect, 'level', {'v': 'v', 'direction': 'direction'})}"])
+            if not effect.is_of_the_input:
+                lines += self.guard(effect, [f"level += {self.call(effect, 'level', {'v': 'v', 'direction': 'direction'})}"])
         rubbing = f"effort += {turn} * direction * level"
         bristled: list[str] = []
         for effect in self.of("bristle"):
@@ -115,16 +116,23 @@ class InverseText(LawText):
         return [f"if {shake} > 0.0:", *("    " + line for line in halves), "else:", *("    " + line for line in calm)]
 
     def _forces(self) -> list[str]:
-        """Forces, added once; iterated if one depends on the voltage itself."""
-        if not self.of("force"):
+        """Forces, added once; iterated if one depends on the voltage itself, and longer if it is friction."""
+        rubbing = [effect for effect in self.of("friction") if effect.is_of_the_input]
+        if not self.of("force") and not rubbing:
             return []
         lines: list[str] = ["pull = 0.0"]
         for effect in self.of("force"):
             words = {"u": "total", "v": "v", "x": "x", "t": "0.0"}
             lines += self.guard(effect, [f"pull += {self.call(effect, 'force', words)}"])
+        for effect in rubbing:
+            words = {"u": "total", "v": "v", "direction": "direction"}
+            lines += self.guard(effect, [f"pull += {self.numbers['turn']} * direction * {self.call(effect, 'level', words)}"])
         lines.append("total = effort + pull")
-        asks = any("u" in arguments(effect.functions["force"]) for effect in self.of("force"))
-        return [f"for _ in range({PASSES}):", *("    " + line for line in lines)] if asks else lines
+        if not rubbing and not any("u" in arguments(effect.functions["force"]) for effect in self.of("force")):
+            return lines
+        passes = [f"passes = {TRIES if rubbing and not self.guarded else PASSES}"]
+        passes += [line for effect in rubbing if self.guarded for line in self.guard(effect, [f"passes = {TRIES}"])]
+        return [*passes, "for _ in range(passes):", *("    " + line for line in lines)]
 
     def _lag(self) -> list[str]:
         """Inverse of a first-order lag: adds its time constant times the rate of change."""

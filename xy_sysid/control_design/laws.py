@@ -35,14 +35,21 @@ def asks(effect: Effect) -> frozenset[str]:
 
 
 def friction(model: AxisModel, speed: float, direction: float) -> float:
-    """Size of all dry friction while the axis slides at a constant speed, V; at speed 0 that at breakaway."""
-    level = sum(ask(effect, values, "level", {"v": speed, "direction": direction}) for effect, values in of_category(model, "friction"))
+    """Size of all dry friction while the axis slides at a constant speed without an input, V; at speed 0 that at breakaway."""
+    level = sum(ask(effect, values, "level", {"u": 0.0, "v": speed, "direction": direction}) for effect, values in of_category(model, "friction"))
     for effect, values in of_category(model, "bristle"):
         v = speed if speed != 0.0 else direction * 1e-6
         state = {effect.states[0]: 0.0}
         bent = ask(effect, values, "bend", {**state, "v": v, "h": LONG / abs(v), "level": level})
         return abs(ask(effect, values, "force", {effect.states[0]: bent, "v": v, "level": level}))
     return level
+
+
+def driving_factor(model: AxisModel) -> float:
+    """Fraction of the voltage that drives the axis in the direction of its motion; the rest is friction that grows with the voltage."""
+    words = {"v": model.gain, "direction": 1.0}
+    rubbing = [item for item in of_category(model, "friction") if item[0].is_of_the_input]
+    return 1.0 - sum(ask(*item, "level", {**words, "u": 1.0}) - ask(*item, "level", {**words, "u": 0.0}) for item in rubbing)
 
 
 def force(model: AxisModel, speed: float, place: float, *, of_speed: bool | None = None, by_place: bool | None = None) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design.inverse import feedforward
-from xy_sysid.control_design.laws import force, friction
+from xy_sysid.control_design.laws import driving_factor, force, friction
 from xy_sysid.control_design.path import Bounds, SampledPath, s_curve
 from xy_sysid.control_design.sample_step import sections
 from xy_sysid.errors import BadInput
@@ -77,7 +77,7 @@ def fastest(models: Sequence[AxisModel], places: Sequence[float], limit: float, 
 def _at_rest(model: AxisModel, low: float, high: float) -> float:
     """The largest voltage needed for a start from rest between two positions, V."""
     rubs = max(friction(model, 0.0, 1.0), friction(model, 0.0, -1.0))
-    return rubs + max(abs(force(model, 0.0, float(x))) for x in np.linspace(low, high, PLACES))
+    return (rubs + max(abs(force(model, 0.0, float(x))) for x in np.linspace(low, high, PLACES))) / driving_factor(model)
 
 
 def _ringing(model: AxisModel, sampling_rate: float) -> float:

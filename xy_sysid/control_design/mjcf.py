@@ -205,7 +205,8 @@ def _spring(polynomial: FloatArray, turn: float) -> tuple[float, str]:
 
 def _friction(model: AxisModel, said: Said) -> float | tuple[float, ...]:
     """One level, V (0 without any); or the LuGre model: stiffness, damping, level at speed, level at rest, speed at which it falls."""
-    bristles, plain = list(of_category(model, "bristle")), list(of_category(model, "friction"))
+    bristles, plain = list(of_category(model, "bristle")), [item for item in of_category(model, "friction") if item[0].is_dry]
+    said.lost += [(effect.name, "friction that grows with the input") for effect, _ in of_category(model, "friction") if effect.is_of_the_input]
     if not bristles and not plain:
         return 0.0
     fast = 1e3 * abs(model.gain)

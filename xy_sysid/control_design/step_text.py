@@ -76,7 +76,7 @@ class StepText(LawText):
     def _levels(self, speed: str) -> list[str]:
         lines: list[str] = []
         for effect in self.of("friction"):
-            words = {"v": speed, "direction": "direction"}
+            words = {"u": "drive", "v": speed, "direction": "direction"}
             lines += self.guard(effect, [f"level += {self.call(effect, 'level', words)}"])
         return lines
 

@@ -56,7 +56,7 @@ class Correction:
 
 def friction_table(model: PhysicalModel, top: float) -> Correction | None:
     """Dry friction, signed, by speed from -``top`` to ``top``, m/s; None without dry friction."""
-    if not any(of_category(model.model, "friction", "bristle")):
+    if not any(effect.is_dry for effect, _ in of_category(model.model, "friction", "bristle")):
         return None
     positive = np.concatenate(([0.0], np.geomspace(1e-3 * top, top, SPEEDS)))
     speeds = np.concatenate((-positive[::-1], positive))

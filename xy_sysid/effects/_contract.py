@@ -9,7 +9,7 @@ quantities of the simulation at that moment (``WORDS``). So a law looks like its
 | input | output(u, t, x) | V | on each held voltage sample, before the delay |
 | state | advance(states, u, v, x, t, h, gain, pole) | V that acts, new states | on the voltage in each sub-step |
 | force | force(u, v, x, t, gain) | V against the drive | in each sub-step; x is the measured position |
-| friction | level(v, direction) | V, never negative | dry friction with sticking; zero crossings of v are located in time |
+| friction | level(u, v, direction) | V, never negative | dry friction with sticking; zero crossings of v are located in time |
 | bristle | bend(state, v, h, level), force(state, v, level) | new state; V | all dry friction acts through it |
 | motion | section(fs) | b0, b1, b2, a1, a2 | linear filter section on the motion, gain 1 at 0 Hz (see ``axis.resonant_loop``) |
 | encoder | error(x) | m | added to the encoder reading; x is the true position, 0 where the encoder shows 0 |
@@ -359,8 +359,13 @@ class Effect:
 
     @property
     def is_dry(self) -> bool:
-        """True for a law of dry friction."""
-        return self.category in ("friction", "bristle")
+        """True for a law of dry friction that holds an axis without a drive, as every machine has it; its level does not depend on the input."""
+        return self.category in ("friction", "bristle") and not self.is_of_the_input
+
+    @property
+    def is_of_the_input(self) -> bool:
+        """True for dry friction whose level depends on the input."""
+        return self.category == "friction" and "u" in arguments(self.functions["level"])
 
     @property
     def is_behind(self) -> bool:

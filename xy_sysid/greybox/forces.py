@@ -1,6 +1,6 @@
 """Forces of the effects of a model on the measured motion, and models in which other effects replace the force of one.
 
-Nothing is simulated: position, time and speed are measured, and these laws depend on nothing else.
+Nothing is simulated: position, time, speed and input are measured, and these laws depend on nothing else.
 """
 
 from __future__ import annotations
@@ -38,15 +38,18 @@ def force_of(data: AxisData, model: AxisModel, name: str, counts: Sequence[int])
 
 
 def dry_frictions(model: AxisModel) -> list[str]:
-    """Names of the effects of dry friction that depend on speed alone."""
+    """Names of the effects of dry friction that depend on speed and input alone."""
     return [name for name, _ in model.effects if model.library[name].category == "friction"]
 
 
 def friction_of(scene: Scene, model: AxisModel, name: str) -> FloatArray:
     """(n,) V, friction force of a model against the drive, on the measured motion, while the axis moves."""
-    velocity = scene.smooth(scene.velocity, SMOOTH)
-    speeds = np.linspace(float(np.min(velocity)), float(np.max(velocity)), 2 * SPEEDS)
-    level = np.interp(velocity, speeds, _levels(model.library[name], np.array(dict(model.effects)[name]), speeds))
+    velocity, effect, values = scene.smooth(scene.velocity, SMOOTH), model.library[name], np.array(dict(model.effects)[name])
+    if effect.is_of_the_input:
+        level = _levels(effect, values, velocity, scene.voltage)
+    else:
+        speeds = np.linspace(float(np.min(velocity)), float(np.max(velocity)), 2 * SPEEDS)
+        level = np.interp(velocity, speeds, _levels(effect, values, speeds))
     return np.asarray(np.copysign(1.0, model.gain) * scene.direction() * level)
 
 
@@ -149,11 +152,12 @@ def is_position_force(effect: Effect) -> bool:
     return effect.category == "force" and undoable(effect)
 
 
-def _levels(effect: Effect, values: FloatArray, speeds: FloatArray) -> FloatArray:
-    """(n,) V, the level of a dry friction at each speed (m/s)."""
+def _levels(effect: Effect, values: FloatArray, speeds: FloatArray, voltage: FloatArray | None = None) -> FloatArray:
+    """(n,) V, the level of a dry friction at each speed (m/s), under each voltage (V; zero if not given)."""
     law = effect.functions["level"]
     own, asked = dict(zip(effect.names, values.tolist(), strict=True)), arguments(law)
-    rows = [{**own, "v": speed, "direction": float(np.sign(speed))} for speed in speeds.tolist()]
+    drive = np.zeros(speeds.size) if voltage is None else voltage
+    rows = ({**own, "u": u, "v": v, "direction": float(np.sign(v))} for u, v in zip(drive.tolist(), speeds.tolist(), strict=True))
     return np.array([law(**{word: row[word] for word in asked}) for row in rows])
 
 
