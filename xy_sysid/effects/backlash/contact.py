@@ -8,6 +8,7 @@ Identification, 2nd ed., sec. 3.2). The filter that predicts is in ``filter_temp
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from xy_sysid.effects.backlash.filter_source import NAMES
 from xy_sysid.effects.backlash.innovations import CLOSED, Innovations, View
 from xy_sysid.effects.backlash.starts import SECOND, best_around, best_of_grid
 from xy_sysid.effects.backlash.usual_machine import from_usual, to_usual, usual
+from xy_sysid.jit import on_all_cores
 from xy_sysid.samples.block import FloatArray
 
 RIGID = (CLOSED, 0.4, 1500.0, 0.1, 0.0, 0.03, 0.0, 0.0)  # no gap
@@ -41,13 +43,15 @@ class Contact:
         fit = Innovations(task.sampling_rate, task.base, task.noise, task.companions, task.dry.laws)
         fit.late = task.limits.late
         whole, near = WHOLE.within(task.stages[0]), SECOND.within(task.stages[0])
-        best = self._earlier(fit, task)
-        if best is None:
+        first_without_gap = partial(self._fit_without_gap, fit, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
+        earlier = self._earlier(fit, task)
+        if earlier is None:
             found, scale = best_of_grid(fit, task)
             if task.limits.bar is not None and scale * task.noise > BEHIND * task.limits.bar:
                 return self._result(fit, task, found, (1.0, fit.innovations(found, View(task.stages[2]))))
-            best = best_around(fit, task, found)
-        rigid = self._fit_without_gap(fit, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
+            best, rigid = on_all_cores(lambda job: job(), (partial(best_around, fit, task, found), first_without_gap))
+        else:
+            best, rigid = earlier, first_without_gap()
         if task.limits.bar is not None:
             process_noise_factor, innovation = self._predicted(fit, best, task)
             without_gap = fit.with_soft_contact(SOFT).innovations(rigid, near)
@@ -65,8 +69,8 @@ class Contact:
     def _predicted(fit: Innovations, inner: FloatArray, task: OneStepTask) -> tuple[float, FloatArray]:
         """The process-noise factor that predicts the first stage best, and all innovations with it, over the encoder noise."""
         first, training, n = task.stages
-        sizes = {factor: _rms(fit.innovations(inner, View(min(first, training), factor))) for factor in PROCESS_NOISE_FACTORS}
-        best = min(PROCESS_NOISE_FACTORS, key=lambda factor: sizes[factor])
+        sizes = on_all_cores(lambda factor: _rms(fit.innovations(inner, View(min(first, training), factor))), PROCESS_NOISE_FACTORS)
+        best = PROCESS_NOISE_FACTORS[int(np.argmin(sizes))]
         return best, fit.innovations(inner, View(n, best))
 
     @staticmethod
