@@ -78,7 +78,8 @@ def fleet(
         def tell(now: Progress) -> None:
             bar.update(task, description=now.sentence(), total=now.total, completed=now.done)
             if now.done == 0 and now.place:
-                aside.print(f"{now.total} recordings on {now.workers} processes; dashboard: {now.place}")
+                many, on = "" if now.total == 1 else "s", "" if now.workers == 1 else "es"
+                aside.print(f"{now.total} recording{many} on {now.workers} process{on}; dashboard: {now.place}")
             elif bar.disable and time.perf_counter() - last[0] > EVERY:
                 last[0] = time.perf_counter()
                 aside.print(now.sentence())
