@@ -80,7 +80,7 @@ EXAMPLES = (
         "load_dependent_friction",
         (FREQUENCY, SPEED, ZOOM),
         "By frequency the error is flat up to the pole of the axis, as with Coulomb friction. But against velocity the mean error is small and has "
-        "hardly a jump at standstill, because the friction is as large as the input, which can have any value there.",
+        "hardly a jump at standstill, because the friction is a fraction of the input, which can have any value there.",
     ),
     Example(
         "asymmetric_friction",

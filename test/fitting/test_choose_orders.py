@@ -93,6 +93,15 @@ def test_few_lines_buy_few_orders() -> None:
     assert orders(choose(few, Structure())) in ((0, 1), (0, 2))
 
 
+def test_a_choice_does_not_stand_where_a_tried_structure_has_too_few_lines() -> None:
+    """Its loss cannot be shown again, so the orders are searched anew; no error ends the fit."""
+    seen = held(paper_machine(), 0.03, seed=3)
+    first, options = choose(seen, Structure(), thorough=False), FitOptions(relative_change=1e-6)
+    assert stands(seen, first, first.fit, options)
+    few = seen.select(slice(60, 120, 30))
+    assert not stands(few, first, first.fit, options)
+
+
 @pytest.mark.parametrize(
     ("path", "hold", "wanted", "frequency"),
     [

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from helpers.live_streams import AXES, blocks, last, recorded
 from xy_sim.machine import Machine
 from xy_sysid.cli.simulated_recording import simulate
 from xy_sysid.errors import BadInput
+from xy_sysid.fitting import identify
 from xy_sysid.fitting.choose_orders import Choice, choose
+from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import Structure
 from xy_sysid.live import fitter
 from xy_sysid.live.fitter import LiveFitter, Update
@@ -178,6 +182,22 @@ def test_orders_are_searched_once_while_new_data_only_confirm_them(paper: Record
     assert len(searched) == len(AXES)
     fits = [update.axes[axis].fit for update in updates for axis in AXES]
     assert {(fit.structure.numerator_order, fit.structure.denominator_order) for fit in fits if fit is not None} == {(2, 4)}
+
+
+def test_orders_with_too_many_parameters_for_fewer_lines_are_chosen_again(paper: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The coherence fell, or the source came back at another rate: an error of the old orders does not end the fits."""
+    *_, last = [update.request for update in replay(blocks(paper), SETTINGS, AXES)]
+    fits = LiveFitter(SETTINGS)
+    fits.fit(replace(last, number=1))
+
+    def refused(*given: Any, **named: Any) -> Fit:
+        if named.get("doubt") is False:
+            raise BadInput("number of trusted lines", 5, "more than 5", "Record longer.")
+        return identify(*given, **named)
+
+    monkeypatch.setattr(fitter, "identify", refused)
+    found = fits.fit(replace(last, number=4)).axes
+    assert [(update.problem, update.fit is not None) for update in found.values()] == [("", True)] * len(AXES)
 
 
 def test_orders_that_explain_the_data_are_not_lost_again() -> None:

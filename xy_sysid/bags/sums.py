@@ -79,7 +79,7 @@ def check_sums(path: Path) -> Checked:
 
 
 def _agree(path: Path, told: dict[str, tuple[int, int]]) -> bool:
-    """True if all messages in the checksums are there, and their sums agree; much faster than SQL, as the pages are read in compiled code."""
+    """True if every topic has the recorded number of messages and the recorded sum. Pages are read in compiled code; if False, SQL decides."""
     found, wanted, notes = dict.fromkeys(told, (0, 0)), list(told), list[str]()
     try:
         for name in _databases(path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import gc
 import io
 import os
 import sys
@@ -19,7 +18,6 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 INTERRUPTED, TERMINATED, WRONG = 130, 143, 2
 _interrupts = Interrupts()
-SELDOM = 100_000  # new objects before a search for unreachable ones: imports and figures make millions that stay; 0.1 to 0.2 s of a command
 LONGEST = 800  # characters of an error message; the wrong value in it may be very long
 
 
@@ -144,7 +142,6 @@ def _nowhere() -> TextIO:
 
 def main() -> None:
     """Entry point of the console script."""
-    gc.set_threshold(SELDOM)
     atexit.register(_interrupts.leave)  # registered first, called last: then the exit code is final
     sys.stdout = sys.stdout or _nowhere()
     sys.stderr = sys.stderr or _nowhere()

@@ -35,7 +35,7 @@ def asks(effect: Effect) -> frozenset[str]:
 
 
 def friction(model: AxisModel, speed: float, direction: float) -> float:
-    """Size of all dry friction while the axis slides at a constant speed without an input, V; at speed 0 that at breakaway."""
+    """Dry friction at a constant speed, V, without the friction that grows with the input; at speed 0 the breakaway level."""
     level = sum(ask(effect, values, "level", {"u": 0.0, "v": speed, "direction": direction}) for effect, values in of_category(model, "friction"))
     for effect, values in of_category(model, "bristle"):
         v = speed if speed != 0.0 else direction * 1e-6

@@ -10,7 +10,7 @@ import numpy as np
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.laws import along, asks, friction, of_category
+from xy_sysid.control_design.laws import along, asks, driving_factor, friction, of_category
 from xy_sysid.control_design.uncertain import derive_row
 from xy_sysid.samples.block import FloatArray
 
@@ -64,7 +64,7 @@ def friction_table(model: PhysicalModel, top: float) -> Correction | None:
 
     def of(item: AxisModel) -> FloatArray:
         turn = math.copysign(1.0, item.gain)
-        return np.array([turn * way * friction(item, float(v), float(way)) for v, way in zip(speeds, ways, strict=True)])
+        return np.array([turn * way * friction(item, float(v), float(way)) for v, way in zip(speeds, ways, strict=True)]) / driving_factor(item)
 
     value, low, high = derive_row(model, of)
     meaning = "add to the command while the path moves at this speed; the two rows at 0 are breakaway back and forth"
@@ -91,7 +91,8 @@ def position_tables(model: PhysicalModel, travel: tuple[float, float]) -> tuple[
 
 
 def _along(places: FloatArray, what: str) -> Callable[[AxisModel], FloatArray]:
-    return lambda item: along(item, places, what)
+    """The row of a table; where it is added to the command, with the friction that grows with the command."""
+    return lambda item: along(item, places, what) / (driving_factor(item) if what in ("force", "drag") else 1.0)
 
 
 def _has_force(model: AxisModel) -> bool:

@@ -359,7 +359,7 @@ class Effect:
 
     @property
     def is_dry(self) -> bool:
-        """True for a law of dry friction that holds an axis without a drive, as every machine has it; its level does not depend on the input."""
+        """True for dry friction whose level does not depend on the input. It holds an axis at rest without a drive."""
         return self.category in ("friction", "bristle") and not self.is_of_the_input
 
     @property

@@ -93,20 +93,24 @@ def choose(frf: FrequencyResponse, family: Structure, thorough: bool = True) -> 
 
 
 def stands(frf: FrequencyResponse, choice: Choice, now: Fit, options: FitOptions) -> bool:
-    """True if a choice that was not thorough would be the same for a newer response of this axis, for which ``now`` is the fit of its orders.
+    """True if the orders of a choice that was not thorough still serve for a newer response of this axis, for which ``now`` is their fit.
 
-    This holds if noise explains the fit, so that no higher orders would be tested, and if every other structure that was tested loses again.
+    This holds if noise explains the stable fit, so that no higher orders would be tested, and if every other structure that was tested loses again.
     Each of these starts from its own model of that time, which takes a small part of the time of ``choose``.
     """
-    if not (now.converged and now.consistent and choice.others):
+    if not (now.converged and now.consistent and now.tf.is_stable and choice.others):
         return False
     data, scale = independent_data(frf, len(now.frequency)), max(1.0, excess(now))
     length = description_length(now, data, scale)
     for structure, tf in choice.others:
-        task = problem(frf, structure)
-        start = from_transfer_function(task, tf)
         simpler = structure.parameters < now.structure.parameters
-        if start is None or not length < length_of(minimise(task, start, warm(options)).cost, structure, data, scale) - CLEARLY * simpler:
+        try:
+            task = problem(frf, structure)
+            start = from_transfer_function(task, tf)
+            cost = None if start is None else minimise(task, start, warm(options)).cost
+        except (BadInput, ZeroDivisionError, np.linalg.LinAlgError):  # too few lines for it, or outside the range of floating-point numbers
+            cost = None
+        if cost is None or not length < length_of(cost, structure, data, scale) - CLEARLY * simpler:
             return False
     return True
 

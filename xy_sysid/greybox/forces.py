@@ -46,7 +46,9 @@ def friction_of(scene: Scene, model: AxisModel, name: str) -> FloatArray:
     """(n,) V, friction force of a model against the drive, on the measured motion, while the axis moves."""
     velocity, effect, values = scene.smooth(scene.velocity, SMOOTH), model.library[name], np.array(dict(model.effects)[name])
     if effect.is_of_the_input:
-        level = _levels(effect, values, velocity, scene.voltage)
+        most = float(np.max(np.abs(scene.voltage), initial=0.0))
+        drives = np.linspace(-most, most, 2 * SPEEDS + 1)  # with 0, where such a level has its corner
+        level = np.interp(scene.voltage, drives, _levels(effect, values, np.full(drives.size, np.std(velocity)), drives))
     else:
         speeds = np.linspace(float(np.min(velocity)), float(np.max(velocity)), 2 * SPEEDS)
         level = np.interp(velocity, speeds, _levels(effect, values, speeds))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -139,9 +140,10 @@ class LiveFitter:
         structure = choice.fit.structure if choice is not None else structure_from(self._settings)
         if self._settings.orders_from_data and number & (number - 1) == 0:
             if choice is not None and start is not None:
-                fit = identify(frf, structure, start.tf, OPTIONS, doubt=False)
-                if stands(frf, choice, fit, OPTIONS):
-                    return fit
+                with suppress(BadInput):  # too few trusted lines for these orders: others are chosen
+                    fit = identify(frf, structure, start.tf, OPTIONS, doubt=False)
+                    if stands(frf, choice, fit, OPTIONS):
+                        return fit
             choice = self._choices[axis] = choose(frf, structure_from(self._settings), thorough=False)
             structure, start = choice.fit.structure, choice.fit
         doubt = number <= FIRST_FITS or number % LATER_DOUBT == 0

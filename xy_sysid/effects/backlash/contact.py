@@ -25,8 +25,8 @@ SOFT = 10.0  # rad/s, lower bound of the contact that replaces the gap in the fi
 SEEN, LEFT = 2.5, 1.5  # least gap, in encoder noises, and in rms innovations
 WHOLE = View(samples=1_000_000, process_noise_factor=0.5, sub_steps=4)
 PROCESS_NOISE_FACTORS = (1.0, 0.3, 0.1, 0.03)  # factors on the process noise to choose from: the one that predicts the first stage best
-BEHIND = 1.5  # innovation over the bar, above which the fit is given up after the first grid, and after the second. Development draws and other
-# machines: true gaps 0.1 to 1.4 and 0.1 to 1.1; no gap 1.5 to 20 and 1.2 to 18
+BEHIND = 1.5  # innovation over the bar, after the first grid and after the second, above which the fit is given up. Development draws and other
+# machines: gaps 0.1 to 1.4 after the first grid and 0.1 to 1.1 after the second; no gap 1.5 to 20 and 1.2 to 18
 IDLE = 0.9  # innovation with a gap over that without it, after the first fits, above which the gap has no effect, and must reach the bar. The same
 # machines: gaps that were finally found 0.04 to 0.82; no gap mostly 0.95 to 1.1
 OWN, GAP, HERTZ = len(NAMES), NAMES.index("gap"), NAMES.index("hertz")
@@ -43,7 +43,8 @@ class Contact:
         fit = Innovations(task.sampling_rate, task.base, task.noise, task.companions, task.dry.laws)
         fit.late = task.limits.late
         whole, near = WHOLE.within(task.stages[0]), SECOND.within(task.stages[0])
-        first_without_gap = partial(self._fit_without_gap, fit, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
+        soft = fit.with_soft_contact(SOFT)
+        first_without_gap = partial(self._fit_without_gap, soft, fit.start(task.base, RIGID, task.dry.values), near, 1e-2)
         earlier = self._earlier(fit, task)
         if earlier is None:
             found, scale = best_of_grid(fit, task)
@@ -54,15 +55,15 @@ class Contact:
             best, rigid = earlier, first_without_gap()
         if task.limits.bar is not None:
             process_noise_factor, innovation = self._predicted(fit, best, task)
-            without_gap = fit.with_soft_contact(SOFT).innovations(rigid, near)
+            without_gap = soft.innovations(rigid, near)
             idle = task.earlier is None and fit.scale(fit.innovations(best, near)) > IDLE * fit.scale(without_gap)
             if fit.scale(innovation[task.stages[1] :]) * task.noise > (1.0 if idle else BEHIND) * task.limits.bar:
                 return self._result(fit, task, best, (process_noise_factor, innovation))
         best = fit.solved(best, np.arange(best.size), whole, 20, 1e-3)
         calm = replace(whole, process_noise_factor=self._predicted(fit, best, task)[0])
         best = fit.solved(best, np.arange(best.size), calm, 10, 1e-3)
-        rigid = self._fit_without_gap(fit, self._start_without_gap(fit, rigid, best, near), whole, 1e-3)
-        without = self._predicted(fit.with_soft_contact(SOFT), rigid, task)[1]
+        rigid = self._fit_without_gap(soft, self._start_without_gap(fit, rigid, best, near), whole, 1e-3)
+        without = self._predicted(soft, rigid, task)[1]
         return self._result(fit, task, best, self._predicted(fit, best, task), fit.spread(best, whole), without)
 
     @staticmethod
@@ -128,9 +129,9 @@ class Contact:
         return min(rigid, closed, key=lambda start: soft.rms(start, view))
 
     @staticmethod
-    def _fit_without_gap(fit: Innovations, start: FloatArray, view: View, enough: float) -> FloatArray:
+    def _fit_without_gap(soft: Innovations, start: FloatArray, view: View, enough: float) -> FloatArray:
         """Fit of the same filter without a gap; the contact may be soft."""
-        return fit.with_soft_contact(SOFT).solved(start, np.delete(np.arange(start.size), [GAP, HERTZ]), view, 15, enough)
+        return soft.solved(start, np.delete(np.arange(start.size), [GAP, HERTZ]), view, 15, enough)
 
 
 def _rms(signal: FloatArray) -> float:
