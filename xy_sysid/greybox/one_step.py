@@ -105,7 +105,7 @@ def companions(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tup
             others.append((name, values))
         elif name != effect.name:
             raise BadInput(
-                "effects", f"{effect.name} with {name}", f"{effect.name} with dry friction that does not depend on the input, or effects that do not depend on speed", "Leave it out."
+                "effects", f"{effect.name} with {name}", f"{effect.name} with dry friction, or effects that do not depend on speed", "Leave it out."
             )
     if not dry_friction and effect.start_friction in model.library.effects:
         first = model.library[effect.start_friction]

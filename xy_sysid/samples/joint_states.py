@@ -182,7 +182,7 @@ class JointCounter:
         return Block(self._axes, seq, time, values), index
 
     def _plain(self, times: FloatArray) -> int:
-        """Number of the next stamps that are counted together: up to a restart, a check of the rate, or one that is not finite; 0 with voltage or velocity."""
+        """Number of the next stamps that are counted together: up to a restart, a check of the rate or one not finite; 0 with voltage or velocity."""
         if self._rate is None or self._counter is None or self._with_voltage or self._path is not None:
             return 0
         latest = np.maximum.accumulate(np.concatenate(([self._latest], times)))[:-1]
