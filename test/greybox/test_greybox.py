@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.signal
 from scipy.signal import butter, sosfilt
 
 from xy_sim.effect_text import with_effects
@@ -171,21 +170,6 @@ def test_the_encoder_is_read_from_the_data() -> None:
     noisy = x + 2e-6 * np.random.default_rng(0).standard_normal(x.size)
     assert encoder_noise(RATE, noisy) == pytest.approx(2e-6, rel=0.1)
     assert encoder_noise(RATE, np.round(noisy / 5e-7) * 5e-7) == pytest.approx(2e-6, rel=0.1)
-
-
-@pytest.mark.parametrize("samples", [500, 3000])
-def test_noise_of_a_short_record_is_not_taken_for_motion(samples: int) -> None:
-    """Levels of few lines differ by chance: white noise of a hundred counts stays noise."""
-    for seed in range(10):
-        noise = 2e-6 * np.random.default_rng([samples, seed]).standard_normal(samples)
-        assert encoder_noise(RATE, np.round(noise / 2e-8) * 2e-8) == pytest.approx(2e-6, rel=0.6)
-
-
-def test_motion_up_to_nyquist_is_no_noise() -> None:
-    """Its level falls from band to band, that of white noise does not: then only the count is left for the encoder."""
-    speed = scipy.signal.lfilter(*scipy.signal.butter(2, 0.3), np.random.default_rng(2).standard_normal(20_000))
-    position = 20.0 * 5e-7 * np.cumsum(speed) / np.std(speed)
-    assert encoder_noise(RATE, np.round(position / 5e-7) * 5e-7) == pytest.approx(5e-7 / np.sqrt(12.0), rel=1e-6)
 
 
 def test_the_same_data_give_the_same_fit_bit_for_bit() -> None:

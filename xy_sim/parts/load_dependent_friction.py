@@ -9,6 +9,7 @@ PART = Part(
     name="load_dependent_friction",
     kind="friction",
     group="added",
+    drawn=False,
     law="f = share |u| sign(v), where u is the voltage of the drive; at rest it holds up to share |u|",
     meaning="gear, worm or harmonic drive: its teeth have more friction the more they transmit",
     source="Duclusaud, Passault, Padois & Ly, Extended friction models, arXiv:2410.08650, 2024; switching as for Coulomb friction",

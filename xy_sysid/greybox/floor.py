@@ -7,7 +7,6 @@ divided by the power density of the error they are the terms of a likelihood (Wh
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -24,8 +23,6 @@ TOP = 700.0  # Hz; above, at 2 kHz, differences of an encoder's position are all
 TOP_SHARE = 0.35  # limit of ``TOP`` for slow sampling, relative to the sampling rate
 WINDOW = 2.0  # s, approximately: the lowest band is 1/2 Hz wide
 NOISE_BAND = (0.6, 0.94)  # relative to Nyquist; its quietest twentieth counts as encoder noise, as harmonics of friction may reach into it
-UNEVEN = 1.2  # ratio of the middle level of the bands to the least: white noise 1.0 to 1.1 in simulations and on encoders, motion 1.2 to 1.8
-SPREAD = 6.0  # the same ratio less 1 for white noise in few lines, times the root of their number: missed by 1 of 130 records of 300 samples
 BINS, HARMONICS, SPARSE = 128, 16, 4  # of the spectrum of quantisation noise, from every fourth sample
 POLES = 60  # number of tested rigid axes
 SEEN = 3.0  # a band is excited if the power of the measured velocity is this many times that of the encoder noise
@@ -156,9 +153,6 @@ class Floor:
 def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "position", driven_by: FloatArray | None = None) -> float:
     """rms of the sensor's white noise, from the quietest band below Nyquist; at least that of quantisation.
 
-    White noise has one level in all bands. If the levels differ, motion extends up to Nyquist, as at low sampling rates or with impacts.
-    Then the noise is that of quantisation; if the data are not quantised, the result is the least level, an upper limit of the noise.
-
     sensed: the measured quantity, in whose unit the result is; position (n,), m, is the measurement or its integral
     driven_by: input (n,); the part of a velocity or acceleration that it explains is not noise, because such motion extends up to Nyquist
     """
@@ -181,10 +175,7 @@ def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "
     if sensed == "position":
         white = white / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
     seen = [float(np.median(white[(share >= low) & (share < low + 0.05)])) for low in np.arange(*NOISE_BAND, 0.05)]
-    least, rounding = float(np.sqrt(min(seen))), count_size(measured) / math.sqrt(12.0)
-    lines = float(np.sum((share >= NOISE_BAND[0]) & (share < NOISE_BAND[0] + 0.05))) * windows.shape[0]  # of one band, of all windows
-    is_white = np.sqrt(np.median(seen)) <= max(UNEVEN, 1.0 + SPREAD / math.sqrt(max(lines, 1.0))) * least
-    return max(rounding, least) if is_white or rounding == 0.0 else rounding
+    return float(np.sqrt(max(min(seen), count_size(measured) ** 2 / 12.0)))
 
 
 def count_size(position: FloatArray) -> float:

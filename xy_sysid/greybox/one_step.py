@@ -17,6 +17,7 @@ from xy_sysid.axis.model import AxisModel, Library, undoer
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import PATIENT, Companions, DryFriction, FilterFit, Limits, OneStepTask, arguments
 from xy_sysid.errors import BadInput
+from xy_sysid.greybox.floor import count_size
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.parameters import Estimate, unit_of
 from xy_sysid.greybox.score_test import bounded
@@ -64,7 +65,7 @@ def filter_fit(
         OneStepTask(
             sampling_rate=data.sampling_rate,
             base=(base.model.gain, base.model.delay, base.model.pole),
-            noise=data.encoder,
+            noise=noise_of(data),
             stages=(first, data.training, data.position.size - 1),
             companions=as_companions(data, library, others),
             dry=dry,
@@ -116,6 +117,12 @@ def companions(model: AxisModel, effect: Effect) -> tuple[DryFriction, tuple[tup
 def one_step_effect(model: AxisModel) -> Effect | None:
     """The effect of a model that only one-step prediction can judge, if there is one."""
     return next((model.library[name] for name, _ in model.effects if model.library[name].one_step is not None), None)
+
+
+def noise_of(data: AxisData) -> float:
+    """Standard deviation of the encoder, m."""
+    count = count_size(data.position)
+    return min(data.encoder, max(count / np.sqrt(12.0), 1e-12)) if count > 0.0 else data.encoder
 
 
 def as_companions(data: AxisData, library: Library, others: Others) -> Companions:

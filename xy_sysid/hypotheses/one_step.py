@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from math import exp, hypot, sqrt
+from math import exp
 
 import numpy as np
 
 from xy_sysid.axis.model import Library
 from xy_sysid.effects._contract import Limits
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.greybox.one_step import error_without
+from xy_sysid.greybox.one_step import error_without, noise_of
 from xy_sysid.greybox.whitened import enough, whitened_rms
 from xy_sysid.hypotheses.companions import Demand, Extended, distinguishable, extended, size_ahead
 from xy_sysid.hypotheses.criteria import AT_FLOOR, FEWEST, FILTERED, SIZE, TELLS
@@ -111,10 +111,10 @@ class OneStepTrials:
     def _fit_once(self, name: str, node: Node, masked: bool) -> None:
         pool = self.pool
         bar = min(self.error_one_step_ahead(each.fit) for each in {node, pool.best})
-        key, noise = (name, node.effects, masked), pool.data.encoder * pool.data.sampling_rate
-        if not bar > exp(0.5 * TELLS) * noise or key in self.fitted:
+        key = (name, node.effects, masked)
+        if not FILTERED * bar > noise_of(pool.data) * pool.data.sampling_rate or key in self.fitted:
             return
-        limits = Limits(hypot(noise, FILTERED * sqrt(bar**2 - noise**2)), pool.late)
+        limits = Limits(FILTERED * bar, pool.late)
         demand = Demand(limits, lambda fit: refusal(pool.data, pool.library, fit), masked)
         extension = extended(pool.data, node.fit, pool.library[name], demand)
         self.fitted[key] = extension
