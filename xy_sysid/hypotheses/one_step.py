@@ -114,8 +114,7 @@ class OneStepTrials:
         key = (name, node.effects, masked)
         if not FILTERED * bar > noise_of(pool.data) * pool.data.sampling_rate or key in self.fitted:
             return
-        limits = Limits(FILTERED * bar, pool.late)
-        demand = Demand(limits, lambda fit: refusal(pool.data, pool.library, fit), masked)
+        demand = Demand(Limits(FILTERED * bar, pool.late), lambda fit: refusal(pool.data, pool.library, fit), masked)
         extension = extended(pool.data, node.fit, pool.library[name], demand)
         self.fitted[key] = extension
         result = OneStepResult((*self._up_to(node), *extension.rungs), bar, error_without(pool.data, extension.found))
