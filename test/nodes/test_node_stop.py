@@ -147,25 +147,24 @@ def alone(process: NodeProcess) -> bool:
 
 
 def test_two_excitations_of_one_name_never_drive(world: World) -> None:
-    """A launch file started twice: neither configures while the other exists, and no voltage is published; a single one drives."""
+    """A launch file started twice: neither configures while it sees the other, and no voltage is published; a single one drives."""
     from lifecycle_msgs.msg import Transition
     from lifecycle_msgs.srv import ChangeState
 
     blocks = world.blocks()
     world.machine(Integrator())
     both = [world.start(EXCITATION, QUIET) for _ in range(2)]
-    client = world.node.create_client(ChangeState, "/xy/excitation/change_state")
-    assert world.until(client.service_is_ready, 20.0)
-    for label in ("configure", "activate"):
-        client.call_async(ChangeState.Request(transition=Transition(label=label)))
     assert world.until(lambda: all("ready" in process.output() for process in both), 20.0)
-    for _ in range(20):  # a request reaches those that the client has discovered
+    client = world.node.create_client(ChangeState, "/xy/excitation/change_state")
+    for _ in range(20):  # a request reaches those that the client has discovered, and one that has not yet discovered the other configures
         if all(alone(process) for process in both):
             break
-        client.call_async(ChangeState.Request(transition=Transition(label="configure")))
+        for label in ("cleanup", "configure"):
+            client.call_async(ChangeState.Request(transition=Transition(label=label)))
         world.until(lambda: all(alone(process) for process in both), 1.0)
     assert all(alone(process) for process in both), [process.output() for process in both]
-    client.call_async(ChangeState.Request(transition=Transition(label="activate")))
+    for label in ("cleanup", "configure", "activate"):
+        client.call_async(ChangeState.Request(transition=Transition(label=label)))
     world.spin(1.0)
     assert blocks == []
     both[1].process.terminate()
