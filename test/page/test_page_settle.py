@@ -14,7 +14,6 @@ from helpers.live_nodes import ready
 from helpers.ros_tools import World, needs_ros, world_in
 
 from xy_sysid.cli.demo_settle import QUIET, RATE, TRAVEL, VOLTAGE
-from xy_sysid.files.walk import run_of
 from xy_sysid.imports import load
 
 pytestmark = [needs_browser, needs_ros]
@@ -71,7 +70,7 @@ def test_run_it_goes_on_by_itself_until_nothing_is_left_to_settle(scene: Scene, 
     tab.until(lambda: "Settled: gravity." in scene.said("[data-part=settle]"), 120, "the experiment did not settle it")
     (folder,) = tmp_path.glob("settle_x_*")
     experiment = yaml.safe_load((folder / "next_1.yaml").read_text(encoding="utf-8"))["experiment"]
-    run = run_of(folder / "1", "x")
+    run = load(folder / "1").run("x")
     assert run.output_unit == "rad" and run.seconds >= 0.95 * experiment["seconds"]
     assert float(abs(run.voltage).max()) <= VOLTAGE and float(abs(run.position).max()) < TRAVEL
     assert load(folder / "1").seq[0] > load(folder / "0").seq[-1]  # the counter continues, so no node detects a restart

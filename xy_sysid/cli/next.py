@@ -123,22 +123,27 @@ def next_(
             answer = next_experiment(found, limits, sets, known, tell=lambda part: bar.update(task, completed=part))
     if not json:
         say(f"axis {names[0]}: {found.sentence.rstrip()}")
-    if trajectory is not None:
-        _write_trajectory(answer, found, runs, known, trajectory)
-    _answered(answer, output, json, notes_of(recordings))
+    motion = _write_trajectory(answer, found, runs, known, trajectory) if trajectory is not None else None
+    _answered(answer, output, json, notes_of(recordings), motion)
 
 
-def _write_trajectory(answer: NextExperiment, found: Answer, runs: tuple[Run, ...], known: Library, to: Path) -> None:
-    """Write the motion of the experiment, as predicted by the first of its sets or the diagnosed model; the joint has the name of the axis."""
+def _write_trajectory(answer: NextExperiment, found: Answer, runs: tuple[Run, ...], known: Library, to: Path) -> Path:
+    """Write the motion of the experiment, as predicted by the first of its sets or the diagnosed model; returns the CSV.
+
+    The joint has the name of the axis. The points are as dense as those of the excitation, if the limits are of one that sends trajectories.
+    """
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.diagnosis.of_run import refine
     from xy_sysid.experiment_design.as_trajectory import as_trajectory
+    from xy_sysid.experiment_design.criteria import POINTS_EACH
     from xy_sysid.files.trajectories import as_csv, as_yaml
 
     model = refine(runs, add=answer.sets[0], auto=False, library=known).model.model if answer.sets else found.final.model
-    made = as_trajectory(answer, model, min(POINTS, answer.sampling_rate))
+    highest = answer.limits.highest
+    made = as_trajectory(answer, model, POINTS_EACH * highest if math.isfinite(highest) else min(POINTS, answer.sampling_rate))
     write_text(to, as_yaml(made, answer.axis))
     write_text(to.with_suffix(".csv"), as_csv(made))
+    return to.with_suffix(".csv")
 
 
 def _replayed(folder: Path, effect_file: list[Path] | None, json: bool) -> int:
@@ -155,12 +160,13 @@ def _replayed(folder: Path, effect_file: list[Path] | None, json: bool) -> int:
     return 0 if all(same) else 1
 
 
-def _answered(answer: NextExperiment, output: Path | None, json: bool, notes: list[str]) -> None:
-    """Write the file, and print the result. notes: of the recordings."""
+def _answered(answer: NextExperiment, output: Path | None, json: bool, notes: list[str], motion: Path | None = None) -> None:
+    """Write the file, and print the result. notes: of the recordings; motion: CSV of its trajectory."""
     from xy_sysid.files.experiment import document, write_experiment
 
     if output is not None and answer.experiment is not None:
-        write_experiment(output, answer)
+        beside = motion is not None and motion.resolve().parent == output.resolve().parent
+        write_experiment(output, answer, motion if beside else None)
     if json:
         file = document(answer) if answer.experiment else None
         emit({"axis": answer.axis, "sentence": answer.sentence, **_plain(answer), "file": file, "notes": notes})

@@ -1,21 +1,26 @@
 """A designed experiment on a machine with its own limits; it is accepted only if it stays within them.
 
-The document is that of ``xy-sysid next``: axis, duration, signal, the required voltage and travel, and the allowed start positions.
+The document is that of ``xy-sysid next``: axis, duration, signal, the required voltage and travel, and the allowed start positions. For a robot
+that takes only trajectories it names a file with the expected motion, which is sent in place of the signal.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import PurePath
 from typing import Any, NamedTuple, Protocol, get_type_hints
 
+import numpy as np
+
 from xy_sysid.errors import BadInput
+from xy_sysid.excitation.trajectory import Trajectory
 from xy_sysid.samples.recording import SAME_RATE
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, changed, unknown_name
 from xy_sysid.units import USUAL, Units
 
-KEYS = ("axis", "rate", "seconds", "ramp", "excitation", "needs", "units", "expects", "sets", "made_by")
+KEYS = ("axis", "rate", "seconds", "ramp", "excitation", "needs", "units", "motion", "expects", "sets", "made_by")
 DRIVES = ("kind", "rms", "low", "high", "period", "steps", "offset", "seed", "centring", "slow", "slow_period")  # allowed settings
 AGAIN = "Design it again within these limits: xy-sysid next with --params."
 
@@ -42,42 +47,42 @@ class Needs:
         return max(low, self.within[0]) - self.reach[0], min(high, self.within[1]) - self.reach[1]
 
 
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """How an experiment begins and moves, by axis. starts: lowest and highest start position; motions: about the start, of trajectories."""
+
+    starts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    motions: Mapping[str, Trajectory] = field(default_factory=dict)
+
+
 class Taken(NamedTuple):
-    """An accepted experiment. settings: of the excitation; starts: by axis, lowest and highest start position."""
+    """An accepted experiment. settings: of the excitation."""
 
     settings: ExcitationSettings
-    starts: dict[str, tuple[float, float]]
+    planned: Planned
 
 
-def with_experiment(settings: ExcitationSettings, document: object, where: str) -> Taken:
+def with_experiment(settings: ExcitationSettings, document: object, where: str, motion: Trajectory | None = None) -> Taken:
     """The settings of the excitation with a designed experiment on one axis; the other axes get their constant offset, which may hold a load.
 
+    motion: that of the document, for a robot that takes only trajectories; others are driven with the signal
     Raises BadInput, in one line, for an invalid document, and for one that exceeds the settings' limits.
     """
     told = _checked(document, where)
     axis = told["axis"]
-    if settings.holds:
-        act = "Run its motion as a trajectory: xy-sysid next --trajectory."
+    if settings.holds and (motion is None or settings.command != "joint_trajectory"):
+        act = "Run its motion as a trajectory: xy-sysid next --trajectory, and command joint_trajectory."
         raise BadInput(f"{where}: interface", "position", "effort or velocity, since an experiment moves the axis by itself", act)
     if axis not in settings.axes:
         raise BadInput(f"{where}: axis", repr(axis), ", ".join(settings.axes), "Design it for one of these.")
-    if abs(told["rate"] / settings.rate - 1.0) > SAME_RATE:
-        raise BadInput(
-            f"{where}: rate", f"{told['rate']:g} Hz", f"{settings.rate:g} Hz, that of the excitation", "Design it from recordings of this rate."
-        )
-    if abs(told["ramp"] - settings.ramp) > 1e-6:
-        own_ramp = f"{settings.ramp:g} s, that of the excitation"
-        raise BadInput(
-            f"{where}: ramp", f"{told['ramp']:g} s", own_ramp, "Design it again with --params, which reads the settings of the excitation."
-        )
-    own, units = settings.axes[axis], settings.units
-    if told["units"] != list(units):
-        other, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
-        raise BadInput(f"{where}: units", other, f"{allowed}, those of the excitation", "Design it from recordings of what the excitation sends.")
-    needs = Needs(**told["needs"])
-    voltage, (low, high) = needs.voltage, needs.travel
-    if not 0.0 <= voltage <= own.limit * (1.0 + 1e-9):
-        raise BadInput(f"{where}: voltage of axis {axis}", f"{voltage:.4g} {units.input}", f"up to its limit of {own.limit:g} {units.input}", AGAIN)
+    own, units, needs = settings.axes[axis], settings.units, Needs(**told["needs"])
+    motions: dict[str, Trajectory] = {}
+    if settings.holds and motion is not None:
+        motions[axis] = _within_limits(settings, told, motion, where)
+        needs = replace(needs, reach=(float(motions[axis].position.min()), float(motions[axis].position.max())))
+    else:
+        _can_be_sent(settings, told, where)
+    low, high = needs.travel
     if not own.travel_min <= low < high <= own.travel_max:
         span, allowed = f"{low:.4g} to {high:.4g} {units.output}", f"{own.travel_min:g} to {own.travel_max:g} {units.output}"
         raise BadInput(f"{where}: travel of axis {axis}", span, f"within {allowed}", AGAIN)
@@ -90,15 +95,60 @@ def with_experiment(settings: ExcitationSettings, document: object, where: str) 
         if 0.0 < most < asked:
             unit = f"{units.output}/s{'^2' * (name == 'acceleration')}"
             raise BadInput(f"{where}: {name} of axis {axis}", f"{asked:.4g} {unit}", f"up to its max_{name} of {most:g} {unit}", AGAIN)
-    values: dict[str, Any] = {f"{axis}.{name}": value for name, value in told["excitation"].items()}
+    values: dict[str, Any] = {} if motions else {f"{axis}.{name}": value for name, value in told["excitation"].items()}
     values |= {f"{other}.{name}": value for other in settings.axes if other != axis for name, value in (("kind", "off"), ("slow", 0.0))}
     made = changed(settings, {**values, "duration": told["seconds"]})
     drives = made.axes[axis]
     together = abs(drives.offset) + drives.slow + drives.rms * (drives.kind != "off")
-    if together > own.limit * (1.0 + 1e-9):  # the drive would clip it, and the motion would differ
+    if not motions and together > own.limit * (1.0 + 1e-9):  # the drive would clip it, and the motion would differ
         words = f"{together:.4g} {units.input} of offset, slow and rms together"
         raise BadInput(f"{where}: excitation of axis {axis}", words, f"up to its limit of {own.limit:g} {units.input}", AGAIN)
-    return Taken(made, {axis: needs.starts(*inside)})
+    return Taken(made, Planned({axis: needs.starts(*inside)}, motions))
+
+
+def _can_be_sent(settings: ExcitationSettings, told: Mapping[str, Any], where: str) -> None:
+    """Raises BadInput if the signal of an experiment differs from that of the excitation in rate, ramp or unit, or exceeds its limit."""
+    if abs(told["rate"] / settings.rate - 1.0) > SAME_RATE:
+        raise BadInput(
+            f"{where}: rate", f"{told['rate']:g} Hz", f"{settings.rate:g} Hz, that of the excitation", "Design it from recordings of this rate."
+        )
+    if abs(told["ramp"] - settings.ramp) > 1e-6:
+        own_ramp = f"{settings.ramp:g} s, that of the excitation"
+        raise BadInput(
+            f"{where}: ramp", f"{told['ramp']:g} s", own_ramp, "Design it again with --params, which reads the settings of the excitation."
+        )
+    axis, units = told["axis"], settings.units
+    if told["units"] != list(units):
+        other, allowed = (f"{drive} and {place}" for drive, place in (told["units"], units))
+        raise BadInput(f"{where}: units", other, f"{allowed}, those of the excitation", "Design it from recordings of what the excitation sends.")
+    voltage, most = told["needs"]["voltage"], settings.axes[axis].limit
+    if not 0.0 <= voltage <= most * (1.0 + 1e-9):
+        raise BadInput(f"{where}: voltage of axis {axis}", f"{voltage:.4g} {units.input}", f"up to its limit of {most:g} {units.input}", AGAIN)
+
+
+def _within_limits(settings: ExcitationSettings, told: Mapping[str, Any], motion: Trajectory, where: str) -> Trajectory:
+    """The motion about its start.
+
+    Raises BadInput if it has another unit or rate, does not begin and end at rest there, or exceeds a limit of the axis.
+    """
+    axis = told["axis"]
+    own, unit = settings.axes[axis], settings.units.output
+    if told["units"][1] != unit:
+        raise BadInput(f"{where}: units", told["units"][1], f"{unit}, that of the excitation", "Design it from its recordings.")
+    rate = (motion.time.size - 1) / motion.time[-1]
+    if abs(rate / settings.rate - 1.0) > SAME_RATE:
+        raise BadInput(f"{where}: points a second", f"{rate:g}", f"{settings.rate:g}, the rate of the excitation", AGAIN)
+    moved = motion.position - motion.position[0]
+    room = own.limit - 0.5 * own.max_speed / settings.rate  # braking takes up to a sample longer than the limits allow
+    speed, acceleration = ("max_speed", motion.speed, own.max_speed, "/s"), ("max_acceleration", motion.acceleration, own.max_acceleration, "/s^2")
+    for name, values, most, per in (("limit", moved, room, ""), speed, acceleration):
+        peak = float(np.max(np.abs(values)))
+        if peak > most:
+            raise BadInput(f"{where}: motion of axis {axis}", f"up to {peak:.4g} {unit}{per}", f"up to its {name} of {most:g} {unit}{per}", AGAIN)
+    step = own.max_acceleration / rate
+    if abs(moved[-1]) > step / rate or max(abs(motion.speed[0]), abs(motion.speed[-1])) > step:
+        raise BadInput(f"{where}: motion of axis {axis}", "one that does not end at rest where it began", "one that does", "Make the file again.")
+    return replace(motion, position=moved)
 
 
 def of_an_experiment(name: str) -> bool:
@@ -141,6 +191,15 @@ def _checked(document: object, where: str) -> Mapping[str, Any]:
     if not 0.0 < told["seconds"] <= 3600.0:
         raise BadInput(f"{where}: seconds", told["seconds"], "above 0, up to 3600", "Make the file again.")
     return told
+
+
+def motion_file(document: object, where: str) -> str:
+    """The name of the file with the motion of a document, empty without one. Raises BadInput for a name that is not of a file beside it."""
+    told = document.get("experiment") if isinstance(document, Mapping) else None
+    name = told.get("motion", "") if isinstance(told, Mapping) else ""
+    if not isinstance(name, str) or PurePath(name).name != name:
+        raise BadInput(f"{where}: motion", repr(name), "the name of a file beside it", "Make the file again.")
+    return name
 
 
 def _number(value: object) -> bool:

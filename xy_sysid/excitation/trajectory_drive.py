@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from xy_sysid.errors import BadInput
-from xy_sysid.excitation.drive import LIVE, Drive, Starts
+from xy_sysid.excitation.designed import Planned
+from xy_sysid.excitation.drive import LIVE, Drive
 from xy_sysid.excitation.motion_plan import MotionPlan, MotionPoints
 from xy_sysid.excitation.trajectory import MotionLimits, Trajectory, trajectory
 from xy_sysid.samples.block import Block, FloatArray
@@ -25,10 +26,11 @@ BEHIND = 0.1  # s of past motion in a message; the controller's clock may be lat
 class TrajectoryDrive(Drive):
     """``Drive`` for trajectories; ``message`` returns the points for the controller."""
 
-    def __init__(self, settings: ExcitationSettings, seq: int = 0, watched: bool = True, starts: Starts | None = None) -> None:
-        """As ``Drive``. Raises BadInput for a motion that exceeds its limits."""
-        super().__init__(settings, seq, watched, starts)
-        self._motions = [_motion(name, axis, settings) for name, axis in settings.axes.items()]
+    def __init__(self, settings: ExcitationSettings, seq: int = 0, watched: bool = True, planned: Planned | None = None) -> None:
+        """As ``Drive``; planned: motions of an experiment. Raises BadInput for a motion that exceeds its limits."""
+        planned = planned or Planned()
+        super().__init__(settings, seq, watched, planned.starts)
+        self._motions = [planned.motions.get(name) or _motion(name, axis, settings) for name, axis in settings.axes.items()]
         self._plan: MotionPlan | None = None
         self._first = 0  # counter at the start of the plan
         self._told: int | None = None  # sample of the plan at the last message
@@ -165,9 +167,11 @@ class TrajectoryDrive(Drive):
         return np.tile(self.safe, (n, 1)) if self._plan is None else self._plan.at(self._sample, n).position
 
 
-def drive_of(settings: ExcitationSettings, seq: int = 0, starts: Starts | None = None) -> Drive:
-    """The drive for these settings; raises BadInput if a signal does not fit the rate or the limits."""
-    return (TrajectoryDrive if settings.command == "joint_trajectory" else Drive)(settings, seq, starts=starts)
+def drive_of(settings: ExcitationSettings, seq: int = 0, planned: Planned | None = None) -> Drive:
+    """The drive for these settings; planned: of an experiment. Raises BadInput if a signal does not fit the rate or the limits."""
+    if settings.command == "joint_trajectory":
+        return TrajectoryDrive(settings, seq, planned=planned)
+    return Drive(settings, seq, starts=None if planned is None else planned.starts)
 
 
 def _motion(name: str, axis: AxisExcitation, settings: ExcitationSettings) -> Trajectory | None:

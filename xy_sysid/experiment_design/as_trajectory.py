@@ -9,7 +9,7 @@ from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.trajectory import Trajectory, faded
-from xy_sysid.experiment_design.criteria import ORDER, POINTS_EACH
+from xy_sysid.experiment_design.criteria import MOST_POINTS, ORDER, POINTS_EACH
 from xy_sysid.experiment_design.of_run import NextExperiment
 
 
@@ -17,13 +17,13 @@ def as_trajectory(found: NextExperiment, model: AxisModel, rate: float) -> Traje
     """The predicted motion of the fitted model in an experiment, as points of a trajectory.
 
     rate: points per second; frequencies above an eighth of it are removed, because a controller cannot follow them between points
-    Raises BadInput if there is no experiment, for a rate above the recording's, and for a motion that would exceed a limit of the machine.
+    Raises BadInput if there is no experiment, for a rate out of range, and for a motion that would exceed a limit of the machine.
     """
     if found.experiment is None:
         raise BadInput("experiment", "none", "one that helps", "Give wider limits, or another setup.")
-    fine = found.sampling_rate
-    if not 1.0 <= rate <= fine:
-        raise BadInput("points a second", rate, f"1 to {fine:g}", "Give the rate of the trajectory's points.")
+    if not 1.0 <= rate <= MOST_POINTS:
+        raise BadInput("points a second", rate, f"1 to {MOST_POINTS:g}", "Give the rate of the trajectory's points.")
+    fine = max(found.sampling_rate, rate)
     start = found.limits.start
     motion = move(model, fine, found.experiment.drive(fine, found.seconds, start))
     sos = scipy.signal.butter(ORDER, min(rate / POINTS_EACH, 0.45 * fine), fs=fine, output="sos")
@@ -43,7 +43,7 @@ def _within(found: NextExperiment, made: Trajectory) -> None:
     """Raises BadInput for a trajectory that is closer to a limit than the margin."""
     limits = found.limits
     free = 1.0 - limits.margin
-    low, high = (limits.start + free * (end - limits.start) for end in limits.travel)
+    low, high = (limits.start + free * max(min(end - limits.start, limits.reach), -limits.reach) for end in limits.travel)
     act = "Design it again within these limits: xy-sysid next."
     if not low <= float(made.position.min()) <= float(made.position.max()) <= high:
         span = (float(made.position.min()), float(made.position.max()))

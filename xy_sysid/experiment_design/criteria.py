@@ -56,5 +56,6 @@ MARGIN = _number("margin", 0.15, "1", "part of speed, acceleration and travel th
 DRAWN = _number("drawn", 2, "draws", "draws of the parameters: the interval depends little on them")
 SHORTEST = _number("shortest", 4.0, "s", "least duration: a few windows")
 LONGER = _number("longer", 1.4, "1", "factor by which an experiment becomes longer if its rehearsal misses the wanted width")
+MOST_POINTS = _number("most_points", 10000.0, "Hz", "points of a trajectory per second, at most; no joint follows more")
 POINTS_EACH = _number("points", 8.0, "1", "points of a trajectory in a period of the highest frequency that it keeps")
 ORDER = _number("order", 4, "1", "of the zero-phase low-pass that makes a trajectory of a motion")

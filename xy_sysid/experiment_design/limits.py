@@ -12,7 +12,7 @@ import numpy as np
 from xy_sysid.axis.forward import Motion
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.motion_check import most_centring
-from xy_sysid.experiment_design.criteria import MARGIN
+from xy_sysid.experiment_design.criteria import MARGIN, POINTS_EACH
 from xy_sysid.experiment_design.experiment import RAMP
 from xy_sysid.samples.recording import Run
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
@@ -30,6 +30,7 @@ class MachineLimits:
     margin: fraction of speed, acceleration and travel that is kept free; seconds: maximum s of one experiment
     centring: V/m, largest centring gain of the excitation; above it the axis would oscillate
     ramp: s, fade-in of the excitation; brake: m, brake zone before each end of the travel, which no experiment enters
+    reach: m, largest distance from the start; highest: Hz, highest frequency of the drive signal that the machine can follow
     units: of the axis; in other units, read V and m above as these
     """
 
@@ -44,13 +45,15 @@ class MachineLimits:
     centring: float = math.inf
     ramp: float = RAMP
     brake: float = 0.0
+    reach: float = math.inf
+    highest: float = math.inf
     units: Units = USUAL
 
     def __post_init__(self) -> None:
-        for name in ("voltage", "rms", "speed", "acceleration", "seconds", "centring"):
+        for name in ("voltage", "rms", "speed", "acceleration", "seconds", "centring", "reach", "highest"):
             if not getattr(self, name) > 0.0:
                 raise BadInput(f"limit of {name}", getattr(self, name), "above 0", "Give the limits of the machine.")
-        most, farthest = (_most(name) for name in ("limit", "travel_max"))
+        most, farthest = (most_of(name) for name in ("limit", "travel_max"))
         if self.voltage > most:
             unit = self.units.input
             raise BadInput("limit of voltage", f"{self.voltage:.4g} {unit}", f"up to {most:g} {unit}", "Give less, or the input in a larger unit.")
@@ -81,7 +84,7 @@ class MachineLimits:
 
     def _free(self, way: float) -> float:
         """Part of the distance to an end, m, that a motion may use: up to the margin, outside the brake zone."""
-        return min((1.0 - self.margin) * way, way - self.brake)
+        return min((1.0 - self.margin) * min(way, self.reach), way - self.brake)
 
     def needed(self, low: float, high: float) -> tuple[float, float]:
         """The travel needed by a motion between two positions, including the margin."""
@@ -114,17 +117,18 @@ def fastest(motion: Motion) -> tuple[float, float]:
 
 
 def of_settings(settings: ExcitationSettings, axis: str) -> dict[str, Any]:
-    """The limits of an axis, by name, from the settings of its excitation."""
+    """The limits of an axis, by name, from the settings of its excitation. For positions, ``limit`` is the reach, and the effort is not limited."""
     own = settings.axes[axis]
-    return {
-        "voltage": own.limit,
+    found: dict[str, Any] = {
         "travel": (own.travel_min, own.travel_max),
         "speed": own.max_speed or math.inf,
         "acceleration": own.max_acceleration or math.inf,
         "ramp": settings.ramp,
         "brake": own.brake,
-        "centring": float(most_centring(settings)[list(settings.axes).index(axis)]),
     }
+    if settings.holds:
+        return {**found, "reach": own.limit, "highest": settings.rate / POINTS_EACH}
+    return {**found, "voltage": own.limit, "centring": float(most_centring(settings)[list(settings.axes).index(axis)])}
 
 
 def as_recorded(runs: Sequence[Run], **told: Any) -> MachineLimits:
@@ -144,6 +148,6 @@ def _peak(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def _most(name: str) -> float:
+def most_of(name: str) -> float:
     """The largest value that the excitation accepts for a setting of an axis."""
     return float(next(bound.le for bound in AxisExcitation.model_fields[name].metadata if hasattr(bound, "le")))

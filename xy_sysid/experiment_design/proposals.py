@@ -48,7 +48,7 @@ def neighbours(experiment: Experiment, limits: MachineLimits, sampling_rate: flo
 
 
 def _grid(limits: MachineLimits, sampling_rate: float) -> Iterator[dict[str, Any]]:
-    most, top = limits.voltage, min(300.0, TOP * sampling_rate)
+    most, top = limits.voltage, min(300.0, TOP * sampling_rate, limits.highest)
     bands = [(0.1, 10.0), (0.1, 50.0), (0.1, top), (20.0, top)]
     for (low, high), part in product(bands, HALVES[:4]):
         if low < high:
@@ -88,7 +88,7 @@ def _experiment(limits: MachineLimits, sampling_rate: float, told: dict[str, Any
     told["rms"] = min(told["rms"], PART.get(told["kind"], 0.0) * limits.voltage)
     told["slow"] = min(told.get("slow", 0.0), max(0.95 * limits.voltage - told["rms"] / PART.get(told["kind"], 1.0), 0.0))
     if "high" in told and told.get("kind") != "off":
-        told["high"] = min(told["high"], 0.45 * sampling_rate)
+        told["high"] = min(told["high"], 0.45 * sampling_rate, limits.highest)
         told["low"] = min(told.get("low", 0.1), 0.5 * told["high"])
     return Experiment(AxisExcitation(**{name: _within(name, value) for name, value in told.items()}), ramp=limits.ramp)
 

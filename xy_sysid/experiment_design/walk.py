@@ -9,10 +9,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.diagnosis.of_run import diagnose
+from xy_sysid.excitation.trajectory import Trajectory
+from xy_sysid.experiment_design.as_trajectory import as_trajectory
 from xy_sysid.experiment_design.design import expects
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
@@ -20,7 +23,22 @@ from xy_sysid.experiment_design.loop import Budget, Decision, Ending, Question, 
 from xy_sysid.experiment_design.of_run import NextExperiment, Tell, answered, check_enough
 from xy_sysid.experiment_design.rivals import names_of, possible
 from xy_sysid.greybox.axis_data import EPSILON, prepare_all
+from xy_sysid.samples.joint_states import SAME_RATE
 from xy_sysid.samples.recording import Run
+
+
+@dataclass(frozen=True, slots=True)
+class RobotJoint:
+    """A joint of a robot that takes only trajectories: its effort is the input of the axis.
+
+    joint: its name; topic: of its joint states; effort_lag: samples by which the effort is older than its stamp
+    points: of a trajectory per second
+    """
+
+    joint: str
+    topic: str
+    points: float
+    effort_lag: int = 0
 
 
 @dataclass(frozen=True)
@@ -28,6 +46,7 @@ class WalkPlan:
     """axis: its name; limits: of the axis; budget: of the whole walk
     sets: of effects to distinguish; empty: those that the diagnosis leaves possible
     tolerance: part of the motion that a model may miss
+    robot: None if the axis is driven with voltages; with it no predicted effort is larger than the largest recorded one
     """
 
     axis: str
@@ -36,6 +55,7 @@ class WalkPlan:
     sets: tuple[tuple[str, ...], ...] = ()
     library: Library = STANDARD
     tolerance: float = EPSILON
+    robot: RobotJoint | None = None
 
 
 @dataclass(frozen=True)
@@ -44,6 +64,7 @@ class WalkStep:
 
     diagnosis: of all recordings, in a sentence; decision: which sets are left; following: the next experiment, None at the end; ending: why
     answer: the same experiment with its requirements; experiments, seconds: used so far, s of motion
+    motion: of the experiment, for a robot that takes only trajectories
     """
 
     diagnosis: str
@@ -53,6 +74,7 @@ class WalkStep:
     answer: NextExperiment | None
     experiments: int = 0
     seconds: float = 0.0
+    motion: Trajectory | None = None
 
     @property
     def sentence(self) -> str:
@@ -68,10 +90,14 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
     runs: the first recording, and one of each experiment so far; before: the step before the last experiment, None at the first
     Raises BadInput if the recordings do not suffice for a diagnosis, or if the last one ends outside the travel.
     """
+    if plan.robot is not None:
+        runs = _of_one_rate(runs)
     found = diagnose(list(runs), plan.library, tolerance=plan.tolerance)
     check_enough(found)
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
     limits = replace(plan.limits, start=float(runs[-1].position[-1]), units=units)
+    if plan.robot is not None:
+        limits = replace(limits, voltage=min(limits.voltage, max(float(np.max(np.abs(run.voltage))) for run in runs)))
     with threadpool_limits(1, "blas"):
         sets = plan.sets or possible(prepare_all(rate, signals, plan.tolerance, units), plan.library, found)
         question = Question(sampling_rate=rate, recordings=signals, sets=sets, library=plan.library, tolerance=plan.tolerance, units=units)
@@ -88,6 +114,10 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
             answer: NextExperiment | None = replace(answered(plan.axis, rate, now, plan.library, following), sentence=expects(now, wanted))
         else:
             answer = answered(plan.axis, rate, made, plan.library) if made is not None else None
+        motion = None
+        if plan.robot is not None and following is not None and answer is not None:
+            best = decision.standing.fits[decision.standing.chosen].model
+            motion = as_trajectory(answer, best, plan.robot.points)
     return WalkStep(
         diagnosis=found.sentence.rstrip(),
         decision=decision,
@@ -96,6 +126,7 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
         answer=answer,
         experiments=experiments,
         seconds=seconds,
+        motion=motion,
     )
 
 
@@ -107,6 +138,12 @@ def steps(plan: WalkPlan, recordings: Sequence[Run]) -> Iterator[WalkStep]:
         yield before
         if before.ending is not None:
             return
+
+
+def _of_one_rate(runs: Sequence[Run]) -> list[Run]:
+    """The runs with the sampling rate of the first: rates from jittering stamps of joint states differ a little."""
+    rate = runs[0].sampling_rate
+    return [replace(run, sampling_rate=rate) if abs(run.sampling_rate / rate - 1.0) <= SAME_RATE else run for run in runs]
 
 
 def told(decision: Decision, ending: Ending, answer: NextExperiment | None = None) -> str:

@@ -10,8 +10,9 @@ import yaml
 from xy_sysid.bags.atomic import write_text
 from xy_sysid.bags.opening import text_of
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.excitation.designed import Taken, document_of, with_experiment
+from xy_sysid.excitation.designed import Taken, document_of, motion_file, with_experiment
 from xy_sysid.files.ros_parameters import load
+from xy_sysid.files.trajectories import motion_of
 from xy_sysid.settings import ExcitationSettings
 
 if TYPE_CHECKING:
@@ -27,9 +28,11 @@ def document(found: NextExperiment) -> dict[str, Any]:
     return made
 
 
-def write_experiment(path: Path, found: NextExperiment) -> None:
-    """Write the file of an experiment, for parameter ``experiment`` of the excitation node."""
+def write_experiment(path: Path, found: NextExperiment, motion: Path | None = None) -> None:
+    """Write the file of an experiment, for parameter ``experiment`` of the excitation node. motion: CSV in the same folder, of its trajectory."""
     exact = document(found)
+    if motion is not None:
+        exact["experiment"]["motion"] = motion.name
     told = _quoted(exact)
     told["experiment"]["needs"] = exact["experiment"]["needs"]  # not rounded to a value above the limit
     text = yaml.safe_dump(told, sort_keys=False, width=120, allow_unicode=True)
@@ -51,7 +54,9 @@ def read_experiment(settings: ExcitationSettings, path: Path) -> Taken:
         text = text_of(path, "an experiment")
     except BadRecording as problem:
         raise BadInput("experiment", f"{path}: {problem.problem}", "a file of xy-sysid next", problem.act) from None
-    return with_experiment(settings, load(text, path.name), path.name)
+    told = load(text, path.name)
+    name = motion_file(told, path.name)
+    return with_experiment(settings, told, path.name, motion_of(path.with_name(name)) if name and settings.holds else None)
 
 
 def _quoted(value: Any) -> Any:

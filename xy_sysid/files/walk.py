@@ -20,9 +20,9 @@ from xy_sysid.bags.opening import text_of
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget
-from xy_sysid.experiment_design.walk import WalkPlan, WalkStep, steps
+from xy_sysid.experiment_design.walk import RobotJoint, WalkPlan, WalkStep, steps
 from xy_sysid.files.experiment import document
-from xy_sysid.imports import load
+from xy_sysid.imports import Reading, load
 from xy_sysid.samples.recording import Run
 from xy_sysid.settings import AnySettings, Settings
 
@@ -35,6 +35,7 @@ UNKNOWN = "Give the folder of a walk: xy-sysid demo --settle and the page make t
 def step_document(step: WalkStep) -> dict[str, Any]:
     """A step as JSON: the diagnosis, the remaining sets of effects, and the next experiment."""
     answer = step.answer if step.following is not None else None
+    words = answer.experiment.said(answer.limits.units) if answer is not None and answer.experiment is not None else ""
     return {
         "diagnosis": step.diagnosis,
         "chosen": list(step.decision.chosen),
@@ -44,7 +45,7 @@ def step_document(step: WalkStep) -> dict[str, Any]:
         "ending": step.ending,
         "experiments": step.experiments,
         "seconds": step.seconds,
-        "words": answer.experiment.said(answer.limits.units) if answer is not None and answer.experiment is not None else "",
+        "words": f"the motion of {words}" if step.motion is not None else words,
         "lasts": answer.seconds if answer is not None else 0.0,
         "file": document(answer) if answer is not None else None,
     }
@@ -59,6 +60,7 @@ def plan_document(plan: WalkPlan) -> dict[str, Any]:
         "budget": asdict(plan.budget),
         "sets": [list(names) for names in plan.sets],
         "tolerance": plan.tolerance,
+        **({} if plan.robot is None else {"robot": asdict(plan.robot)}),
     }
 
 
@@ -70,6 +72,7 @@ class _Plan(Settings):
     budget: Budget
     sets: tuple[tuple[str, ...], ...]
     tolerance: float
+    robot: RobotJoint | None = None
 
 
 class _Walk(Settings):
@@ -85,7 +88,9 @@ def plan_of(told: dict[str, Any], library: Library = STANDARD) -> WalkPlan:
 
 
 def _plan(told: _Plan, library: Library) -> WalkPlan:
-    return WalkPlan(axis=told.axis, limits=told.limits, budget=told.budget, sets=told.sets, library=library, tolerance=told.tolerance)
+    return WalkPlan(
+        axis=told.axis, limits=told.limits, budget=told.budget, sets=told.sets, library=library, tolerance=told.tolerance, robot=told.robot
+    )
 
 
 def _read(kind: type[AnySettings], text: str, where: str) -> AnySettings:
@@ -103,9 +108,14 @@ def write_walk(folder: Path, plan: WalkPlan, done: Iterable[dict[str, Any]]) -> 
     write_text(folder / NAME, json.dumps({"plan": plan_document(plan), "steps": list(done)}, indent=1))
 
 
-def run_of(path: Path, axis: str) -> Run:
-    """The longest gap-free run of an axis in one of the bags."""
-    return load(path).run(axis)
+def run_of(path: Path, plan: WalkPlan) -> Run:
+    """The longest gap-free run of the axis in one of the bags; of a robot's joint, its effort and position."""
+    if plan.robot is None:
+        return load(path).run(plan.axis)
+    robot = plan.robot
+    joints = (f"{plan.axis}={robot.joint}",)
+    reading = Reading(joint_topic=robot.topic, effort_as_voltage=True, joints=joints, effort_lag=robot.effort_lag, axes=(plan.axis,))
+    return load(path, reading).run(plan.axis)
 
 
 def replayed(folder: Path, library: Library = STANDARD) -> list[tuple[dict[str, Any], dict[str, Any]]]:
@@ -119,6 +129,6 @@ def replayed(folder: Path, library: Library = STANDARD) -> list[tuple[dict[str, 
         raise BadInput("walk", f"{folder}: {problem.problem}", f"a folder with {NAME}", UNKNOWN) from None
     told = _read(_Walk, text, f"walk {folder / NAME}")
     plan, kept = _plan(told.plan, library), told.steps
-    recordings = [run_of(folder / str(number), plan.axis) for number in range(len(kept))]
+    recordings = [run_of(folder / str(number), plan) for number in range(len(kept))]
     again = [json.loads(json.dumps(step_document(one))) for one in steps(plan, recordings)]
     return list(zip(kept, again, strict=False))

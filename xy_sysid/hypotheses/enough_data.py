@@ -18,7 +18,10 @@ from xy_sysid.units import USUAL, Units
 def prepared(
     sampling_rate: float, recordings: Sequence[tuple[FloatArray, FloatArray]], epsilon: float = EPSILON, units: Units = USUAL
 ) -> AxisData | str:
-    """The data ready to be fitted (see ``prepare_all``), or what is missing in them, in words."""
+    """The data ready to be fitted (see ``prepare_all``), or what is missing in them, in words.
+
+    Recordings of which one suffices alone suffice together: windows are longer for more data, and another motion may need more of them.
+    """
     voltage, position = _one_after_the_other(recordings)
     if float(voltage.std()) == 0.0:
         return "the input does not move; excite the axis."
@@ -31,6 +34,15 @@ def prepared(
     if data.held_out is data.fitted:
         seconds = voltage.size / sampling_rate
         return f"{seconds:.3g} s without a gap are too few windows to fit some and judge by others; record longer, better 60 s."
+    lacking = _lacking(data, sampling_rate, voltage, position)
+    alone = ([one] for one in recordings if lacking and len(recordings) > 1)
+    if lacking and not any(isinstance(prepared(sampling_rate, one, epsilon, units), AxisData) for one in alone):
+        return lacking
+    return data
+
+
+def _lacking(data: AxisData, sampling_rate: float, voltage: FloatArray, position: FloatArray) -> str:
+    """What these data do not show, in words; empty if nothing is missing."""
     followed, least = _coherence(sampling_rate, voltage, position)
     if followed < least:
         return f"the output does not follow the input (coherence {followed:.2g} at best, {least:.2g} is the least); check which signals these are."
@@ -48,7 +60,7 @@ def prepared(
     excited = int(data.floor.excited.sum())
     if excited < FEWEST:
         return f"only {excited} bands of frequency are excited; use noise or a multisine over the whole band."
-    return data
+    return ""
 
 
 def _one_after_the_other(recordings: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:

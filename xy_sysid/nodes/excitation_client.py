@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
@@ -87,6 +87,19 @@ class ExcitationClient:
         refused = [result.reason for result in self.call(SetParameters, "set_parameters", request).results if not result.successful]
         if refused:
             raise BadInput("excitation", f"refused: {refused[0]}", "settings that it accepts", "Change the run file.")
+
+    def parameters(self, node: str, names: Sequence[str]) -> dict[str, Any]:
+        """Parameters of another node in the namespace; empty if it is not there."""
+        client = self._node.create_client(GetParameters, f"{node}/get_parameters")
+        until = time.monotonic() + SOON
+        future = None
+        while time.monotonic() < until and (future is None or not future.done()):
+            if future is None and client.service_is_ready():
+                future, until = client.call_async(GetParameters.Request(names=list(names))), time.monotonic() + ANSWER
+            self._executor.spin_once(timeout_sec=0.01)
+        answer = future.result() if future is not None and future.done() else None
+        self._node.destroy_client(client)
+        return {} if answer is None else {name: parameter_value_to_python(value) for name, value in zip(names, answer.values, strict=False)}
 
     def state(self) -> str:
         return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)

@@ -22,7 +22,8 @@ from rclpy.timer import Timer
 from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
-from xy_sysid.excitation.drive import Drive, Starts
+from xy_sysid.excitation.designed import Planned
+from xy_sysid.excitation.drive import Drive
 from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
 from xy_sysid.excitation.trajectory_drive import TrajectoryDrive, drive_of
 from xy_sysid.files.experiment import read_experiment
@@ -70,7 +71,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             raise BadInput(f"node excitation: parameter {AXES}", list(axes), "names without a dot", "Give joints short names.")
         self._knobs = declare(self, for_axes(ExcitationSettings, axes), self._accept, also=[AXES], fixed=FIXED)
         self._drive: Drive | None = None
-        self._starts: Starts = {}
+        self._planned = Planned()
         self._pacer = Clock(0.0, 0.0)
         self._answers = Answers()
         self._blocks = 0  # sent since activation
@@ -121,25 +122,26 @@ class ExcitationNode(Overridable, LifecycleNode):
         if rivals:
             return self._refuse(f"{rivals}: configure is refused while it runs. End one of the two. {KILLED}")
         try:
-            self._starts = self._take_experiment()
-            self._drive = drive_of(self._knobs.settings, 0 if self._drive is None else self._drive.seq)  # the counter never goes back
+            self._planned = self._take_experiment()
+            seq = 0 if self._drive is None else self._drive.seq  # the counter never goes back
+            self._drive = drive_of(self._knobs.settings, seq, self._planned)
         except BadInput as error:
             return self._refuse(str(error))
         if isinstance(self._drive, TrajectoryDrive):
             self.get_logger().info(self._drive.sizes)
         return super().on_configure(state)
 
-    def _take_experiment(self) -> Starts:
-        """Set the parameters from the file of a designed experiment; returns where it may begin. Raises BadInput if it exceeds the node's limits."""
+    def _take_experiment(self) -> Planned:
+        """Set the parameters from the file of a designed experiment, and return its plan. Raises BadInput if it exceeds the node's limits."""
         settings = self._knobs.settings
         if not settings.experiment:
-            return {}
-        (wanted, starts), before = read_experiment(settings, Path(settings.experiment)), {item.name: item.value for item in knobs(settings)}
+            return Planned()
+        (wanted, planned), before = read_experiment(settings, Path(settings.experiment)), {item.name: item.value for item in knobs(settings)}
         new = [Parameter(item.name, value=item.value) for item in knobs(wanted) if item.value != before[item.name]]
         answer = self.set_parameters_atomically(new)
         if not answer.successful:
             raise BadInput(settings.experiment, "an experiment", "one that the parameters allow", answer.reason)
-        return starts
+        return planned
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Begin, at 0 V until the first position; refused while STOP is on."""
@@ -158,7 +160,7 @@ class ExcitationNode(Overridable, LifecycleNode):
             if not settings.lockstep:  # a pause is a gap in the counter
                 self._first += max(1, math.ceil((now - self._until) * settings.rate * settings.speed))
         try:
-            self._drive = drive_of(settings, self._first, self._starts)
+            self._drive = drive_of(settings, self._first, self._planned)
         except BadInput as error:
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE

@@ -26,17 +26,20 @@ from xy_sysid.bags import BagWriter
 from xy_sysid.bags.atomic import write_text
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.excitation.designed import of_an_experiment
-from xy_sysid.experiment_design.limits import MachineLimits, of_settings
+from xy_sysid.excitation.trajectory import Trajectory
+from xy_sysid.experiment_design.limits import MachineLimits, most_of, of_settings
 from xy_sysid.experiment_design.loop import Budget
-from xy_sysid.experiment_design.walk import WalkPlan, still_open
+from xy_sysid.experiment_design.walk import RobotJoint, WalkPlan, still_open
+from xy_sysid.files.trajectories import as_csv
 from xy_sysid.files.walk import plan_document, write_walk
 from xy_sysid.nodes.common import NAMESPACE
 from xy_sysid.nodes.convert import from_message
 from xy_sysid.nodes.excitation_client import NODE, ExcitationClient
 from xy_sysid.nodes.wall import Wall
-from xy_sysid.processes.settle_process import Decider
+from xy_sysid.processes.settle_process import Decider, DecisionNews
 from xy_sysid.settings import ExcitationSettings, knobs
 from xy_sysid.story.attempt import BROKEN
+from xy_sysid.units import USUAL, Units
 
 FIRST = 12.0  # s of the first recording, with the excitation at the beginning of the walk
 WHOLE = 0.95  # part of its duration after which an experiment counts as complete; a shorter one was stopped
@@ -60,17 +63,39 @@ class Wishes:
     effect_files: tuple[str, ...] = ()
 
 
-def plan_of(wishes: Wishes, settings: ExcitationSettings) -> WalkPlan:
-    """The plan of a walk on a machine with these settings and limits. Raises BadInput for an unknown axis or a position interface."""
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """The effort in joint states, as the diagnoser reads it. lag: samples by which it is older than its stamp; unit: empty if not known."""
+
+    lag: int = 0
+    unit: str = ""
+
+
+def plan_of(wishes: Wishes, settings: ExcitationSettings, effort: Effort | None = None, namespace: str = NAMESPACE) -> WalkPlan:
+    """The plan of a walk on a machine with these settings and limits.
+
+    effort: of a robot that takes only trajectories. Raises BadInput for an unknown axis, and for other robots that take positions.
+    """
     axis = wishes.axis
     if axis not in settings.axes:
         raise BadInput("axis", repr(axis), ", ".join(settings.axes), "Choose an axis that the excitation drives.")
-    if settings.holds:
+    if settings.holds and settings.command != "joint_trajectory":
         act = "Design one with xy-sysid next --trajectory, and run it there."
-        raise BadInput("interface", "position", "effort or velocity, since an experiment moves the axis by itself", act)
-    own = of_settings(settings, axis)
-    limits = MachineLimits(start=0.5 * sum(own["travel"]), units=settings.units, seconds=wishes.budget.seconds, **own)
-    return WalkPlan(axis, limits, wishes.budget, wishes.sets)
+        raise BadInput("interface", "position", "effort or velocity, since an experiment moves the axis by itself, or joint_trajectory", act)
+    own, units, robot = of_settings(settings, axis), settings.units, None
+    if settings.holds:
+        effort = effort or Effort()
+        units = Units(effort.unit or {"m": "N", "rad": "N m"}[settings.unit], settings.unit)
+        joint = dict(pair.split("=", 1) for pair in settings.joints if pair).get(axis, axis)
+        robot = RobotJoint(joint, absolute(settings.joint_topic, namespace), settings.rate, effort.lag)
+        own["voltage"] = most_of("limit")
+    limits = MachineLimits(start=0.5 * sum(own["travel"]), units=units, seconds=wishes.budget.seconds, **own)
+    return WalkPlan(axis, limits, wishes.budget, wishes.sets, robot=robot)
+
+
+def absolute(topic: str, namespace: str) -> str:
+    """The full name of a topic."""
+    return topic if topic.startswith("/") else f"{namespace.rstrip('/')}/{topic}"
 
 
 class Settler(ExcitationClient):
@@ -86,6 +111,7 @@ class Settler(ExcitationClient):
         self.doing, self.part, self.ending, self.problem = "", 0.0, "", ""
         self._say, self._go, self._namespace = say, go, namespace.rstrip("/")
         self._bag: BagWriter | None = None
+        self._units = USUAL
         self._samples: tuple[int, float] = (0, 0.0)  # recorded voltage samples, and their rate, Hz
         self._status: dict[str, str] = {}
         self._message = ""
@@ -120,16 +146,18 @@ class Settler(ExcitationClient):
         return str(last["sentence"]) if last["ending"] else still_open("stopped", last["left"], last["chosen"])
 
     def _walk(self, settings: ExcitationSettings) -> None:
-        wishes, plan = self.wishes, plan_of(self.wishes, settings)
+        wishes, plan = self.wishes, plan_of(self.wishes, settings, self._effort() if settings.holds else None, self._namespace)
+        self._units = plan.limits.units
         self._listen(settings)
         wishes.folder.mkdir(parents=True, exist_ok=False)
         decider = Decider(plan_document(plan), wishes.effect_files)
         try:
             bag = self._first(settings)
             while not self.ending:
-                step = self._decided(decider, bag)
-                if step is None:
+                news = self._decided(decider, bag)
+                if news is None or news.step is None:
                     break
+                step = news.step
                 self.steps = (*self.steps, step)
                 self._say(step["diagnosis"])
                 self._say(step["sentence"])
@@ -143,7 +171,7 @@ class Settler(ExcitationClient):
                     self.wait(0.1)
                 if self._over():
                     break
-                bag = self._carried_out(len(self.steps), step, settings)
+                bag = self._carried_out(len(self.steps), step, news.motion, settings)
         finally:
             decider.close()
 
@@ -165,10 +193,13 @@ class Settler(ExcitationClient):
                 self._change("deactivate")
         return self.wishes.folder / "0"
 
-    def _carried_out(self, number: int, step: dict[str, Any], settings: ExcitationSettings) -> Path:
+    def _carried_out(self, number: int, step: dict[str, Any], motion: Trajectory | None, settings: ExcitationSettings) -> Path:
         """The bag of an experiment that the excitation has checked and run; sets ``ending`` to stopped if it was not complete."""
-        file, seconds = self.wishes.folder / f"next_{number}.yaml", float(step["lasts"])
-        write_text(file, f"# Experiment {number} of a walk. {step['words']}\n" + yaml.safe_dump(step["file"], sort_keys=False, width=120))
+        file, seconds, content = self.wishes.folder / f"next_{number}.yaml", float(step["lasts"]), step["file"]
+        if motion is not None:
+            write_text(file.with_suffix(".csv"), as_csv(motion))
+            content = {"experiment": {**content["experiment"], "motion": file.with_suffix(".csv").name}}
+        write_text(file, f"# Experiment {number} of a walk. {step['words']}\n" + yaml.safe_dump(content, sort_keys=False, width=120))
         self.doing = f"running experiment {number}: {step['words']}, {seconds:.0f} s"
         if self.state() == "active":
             self._change("deactivate")
@@ -200,7 +231,7 @@ class Settler(ExcitationClient):
                 self.wait(SETTLES)  # messages in transit
                 return
 
-    def _decided(self, decider: Decider, bag: Path) -> dict[str, Any] | None:
+    def _decided(self, decider: Decider, bag: Path) -> DecisionNews | None:
         """The next step, or None if the walk was ended meanwhile. Raises BadInput if the decision fails."""
         if self.ending:
             return None
@@ -213,7 +244,7 @@ class Settler(ExcitationClient):
             if news is not None:
                 self.part = news.part
                 if news.step is not None:
-                    return news.step
+                    return news
             self.wait(0.1)
         return None
 
@@ -248,6 +279,14 @@ class Settler(ExcitationClient):
         except BadInput as problem:
             self.problem = self.problem or str(problem)
 
+    def _effort(self) -> Effort:
+        """The effort as the diagnoser reads it, or the identifier; the usual one if neither runs."""
+        for name in ("diagnoser", "identifier"):
+            told = self.parameters(name, ("effort_lag", "input_unit", "effort_as_voltage"))
+            if told.get("effort_as_voltage"):
+                return Effort(int(told["effort_lag"]), str(told["input_unit"]))
+        return Effort()
+
     # subscriptions
 
     def _listen(self, settings: ExcitationSettings) -> None:
@@ -260,7 +299,7 @@ class Settler(ExcitationClient):
             self._node.create_subscription(kind, topic, self._wall.around(self._writer(topic, kind)), QUALITY, raw=True)
 
     def _writer(self, topic: str, kind: Any) -> Callable[[bytes], None]:
-        name = topic if topic.startswith("/") else f"{self._namespace}/{topic}"
+        name = absolute(topic, self._namespace)
         text = f"{kind.__module__.split('.')[0]}/msg/{kind.__name__}"
 
         def write(message: bytes) -> None:
@@ -278,7 +317,7 @@ class Settler(ExcitationClient):
     @contextmanager
     def _recording(self, number: int, settings: ExcitationSettings) -> Iterator[None]:
         """Write all received messages to a bag meanwhile, which is complete at the end."""
-        units = dict(zip(("input_unit", "output_unit"), settings.units, strict=True))
+        units = dict(zip(("input_unit", "output_unit"), self._units, strict=True))
         with BagWriter(self.wishes.folder / str(number), custom=units) as bag:
             self._bag, self._samples = bag, (0, 0.0)
             try:

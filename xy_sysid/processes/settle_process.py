@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from xy_sysid.excitation.trajectory import Trajectory
 from xy_sysid.files.effects import library
 from xy_sysid.files.walk import plan_of, run_of, step_document
 from xy_sysid.processes.terminal import printable
@@ -22,11 +23,15 @@ NICE = 10  # niceness of the process: receiving data has priority
 
 @dataclass(frozen=True, slots=True)
 class DecisionNews:
-    """Report of the process. part: finished fraction of the design; step: document of the decided step; problem: why there is none."""
+    """Report of the process. part: finished fraction of the design; step: document of the decided step; problem: why there is none.
+
+    motion: of its experiment, for a robot that takes only trajectories
+    """
 
     part: float = 0.0
     step: dict[str, Any] | None = None
     problem: str = ""
+    motion: Trajectory | None = None
 
 
 class Decider:
@@ -77,9 +82,9 @@ def work(pipe: Connection, told: dict[str, Any], effect_files: tuple[str, ...]) 
         while True:
             bag = Path(pipe.recv())
             with Attempt() as attempt:
-                runs.append(run_of(bag, plan.axis))
+                runs.append(run_of(bag, plan))
                 before = step(plan, runs, before, lambda part: pipe.send(DecisionNews(part)))
-                pipe.send(DecisionNews(1.0, step_document(before)))
+                pipe.send(DecisionNews(1.0, step_document(before), motion=before.motion))
             if attempt.detail:
                 sys.stderr.write(printable(f"{bag}: {attempt.detail}") + "\n")
             if attempt.problem:
