@@ -13,10 +13,12 @@ import yaml
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.designed import Needs, document_of, of_an_experiment, with_experiment
 from xy_sysid.excitation.drive import Drive
+from xy_sysid.excitation.trajectory import Trajectory
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment
 from xy_sysid.files.experiment import read_experiment, write_experiment
+from xy_sysid.files.trajectories import as_csv, motion_of
 from xy_sysid.samples.block import Block
 from xy_sysid.settings import AxisExcitation, ExcitationSettings
 
@@ -104,7 +106,7 @@ def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None
     write_experiment(place, made)
     assert yaml.safe_load(place.read_text())["experiment"]["expects"] == made.sentence
     assert read_experiment(OWN, place).settings.axes["x"].slow == read_experiment(narrow, place).settings.axes["x"].slow == 2.0
-    assert read_experiment(OWN, place).starts == {"x": pytest.approx((-0.03, 0.02))}
+    assert read_experiment(OWN, place).planned.starts == {"x": pytest.approx((-0.03, 0.02))}
     with pytest.raises(BadInput, match="Check the path"):
         read_experiment(OWN, tmp_path / "none.yaml")
 
@@ -113,7 +115,7 @@ def test_a_designed_experiment_is_written_and_read_again(tmp_path: Path) -> None
 def test_an_experiment_begins_only_where_it_was_designed_to(place: float, moves: bool) -> None:
     """An experiment designed around 0 could leave its limits from another start: it stops before any voltage, and says where to move."""
     taken = with_experiment(OWN, document(), "next.yaml")
-    drive = Drive(taken.settings, starts=taken.starts)
+    drive = Drive(taken.settings, starts=taken.planned.starts)
     drive.start()
     count = np.arange(2.0)
     drive.see(Block(("x", "y"), count, count / OWN.rate, np.array([[place, 0.1]] * 2)))
@@ -131,3 +133,72 @@ def test_limits_travel_and_guards_are_no_settings_of_an_experiment() -> None:
         if of_an_experiment(name)
     }
     assert changed == {"duration", "experiment", "x.rms", "x.slow"}
+
+
+JOINT = AxisExcitation(kind="multisine", rms=0.0, limit=0.3, max_speed=1.0, max_acceleration=8.0, travel_min=-1.5, travel_max=1.5, brake=0.3)
+ROBOT = ExcitationSettings(axes={"x": JOINT}, output="commands", interface="position", command="joint_trajectory", unit="rad", rate=200.0)
+OF_A_JOINT = document(
+    units=["N m", "rad"],
+    rate=500.0,
+    seconds=4.0,
+    needs={**asdict(NEEDS), "travel": [-0.3, 0.3], "start": 0.1, "reach": [-0.25, 0.25], "within": [-1.5, 1.5]},
+    motion="next.csv",
+)
+
+
+def motion(size: float = 0.2, rate: float = 200.0, end: float = 0.0) -> Trajectory:
+    """Two smooth humps of this size, rad, about 0.1 rad, within 4 s; end: shift of the last point."""
+    time = np.arange(round(4.0 * rate) + 1) / rate
+    moved = size * np.sin(np.pi * time / 4.0) ** 2 * np.sin(2.0 * np.pi * time / 2.0)
+    speed = np.gradient(moved) * rate
+    moved[-1] += end
+    return Trajectory(time=time, position=0.1 + moved, speed=speed, acceleration=np.gradient(speed) * rate, limited_by="the design")
+
+
+def test_a_robot_that_takes_only_trajectories_gets_the_motion_and_keeps_its_limits() -> None:
+    """The motion counts from its start; the rate and unit of the design may be those of the joint's effort. Others are driven with the signal."""
+    settings, planned = with_experiment(ROBOT, OF_A_JOINT, "next.yaml", motion())
+    assert planned.motions["x"].position[0] == 0.0 and np.max(np.abs(planned.motions["x"].position)) == pytest.approx(0.173, abs=0.03)
+    low, high = planned.starts["x"]
+    assert low == pytest.approx(-1.2 - planned.motions["x"].position.min()) and high == pytest.approx(1.2 - planned.motions["x"].position.max())
+    assert settings.duration == 4.0 and settings.axes["x"] == JOINT
+    assert with_experiment(OWN, document(motion="next.csv"), "next.yaml", motion()).planned.motions == {}
+
+
+@pytest.mark.parametrize(
+    ("made", "changes", "words"),
+    [
+        (motion(size=0.4), {}, "next.yaml: motion of axis x is up to 0.3.* rad; allowed: up to 0.2975 rad, by its limit"),
+        (motion(rate=100.0), {}, "next.yaml: points a second is 100; allowed: 200"),
+        (motion(end=0.05), {}, "one that does not end at rest where it began"),
+        (motion(), {"units": ["N", "m"]}, "next.yaml: units is m; allowed: rad, that of the excitation"),
+        (None, {}, "interface is position"),
+    ],
+)
+def test_a_motion_that_asks_for_more_is_refused_in_one_line(made: Trajectory | None, changes: dict[str, Any], words: str) -> None:
+    """Reach, points, rest at both ends and unit; a document without its motion, too."""
+    told = {"experiment": {**OF_A_JOINT["experiment"], **changes}}
+    with pytest.raises(BadInput, match=words) as problem:
+        with_experiment(ROBOT, told, "next.yaml", made)
+    assert "\n" not in str(problem.value)
+    quick = ROBOT.model_copy(update={"axes": {"x": JOINT.model_copy(update={"max_speed": 0.4})}})
+    with pytest.raises(BadInput, match=r"up to 0\.4 rad/s, by its max_speed"):
+        with_experiment(quick, OF_A_JOINT, "next.yaml", motion())
+
+
+def test_the_motion_is_read_from_the_file_that_the_experiment_names(tmp_path: Path) -> None:
+    """As it was written. A name of another folder, a file that lacks, and a file with other columns or uneven times are refused in one line."""
+    (tmp_path / "next.yaml").write_text(yaml.safe_dump(OF_A_JOINT))
+    with pytest.raises(BadInput, match=r"next\.csv"):
+        read_experiment(ROBOT, tmp_path / "next.yaml")
+    (tmp_path / "next.csv").write_text(as_csv(motion()))
+    assert np.array_equal(motion_of(tmp_path / "next.csv").position, motion().position)
+    assert set(read_experiment(ROBOT, tmp_path / "next.yaml").planned.motions) == {"x"}
+    for text in ("", "a,b\n", "time,reference,speed,acceleration\n0,0,0\n", "time,reference,speed,acceleration\n0,0,0,0\n1,0,0,0\n3,0,0,0\n"):
+        (tmp_path / "next.csv").write_text(text)
+        with pytest.raises(BadInput, match=r"motion next\.csv"):
+            read_experiment(ROBOT, tmp_path / "next.yaml")
+    away = {"experiment": {**OF_A_JOINT["experiment"], "motion": "../next.csv"}}
+    (tmp_path / "next.yaml").write_text(yaml.safe_dump(away))
+    with pytest.raises(BadInput, match="the name of a file beside it"):
+        read_experiment(ROBOT, tmp_path / "next.yaml")

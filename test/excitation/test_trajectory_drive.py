@@ -9,7 +9,9 @@ import pytest
 
 from xy_sim.following import Following, Point
 from xy_sysid.errors import BadInput
+from xy_sysid.excitation.designed import Planned
 from xy_sysid.excitation.motion_plan import MotionPoints
+from xy_sysid.excitation.trajectory import Trajectory
 from xy_sysid.excitation.trajectory_drive import TrajectoryDrive, drive_of
 from xy_sysid.samples.block import Block, FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
@@ -233,3 +235,18 @@ def test_a_joint_state_that_comes_while_this_computer_has_stood_still_is_no_faul
     assert not seen(stalled, 0) and "stamped 0.2 s after it comes" in one.drive.unusable
     assert seen(1, stalled) and seen(stalled, stalled)  # one that has waited to be read, and one that has just arrived
     assert not seen(2 * stalled, stalled) and "stamped 0.2 s after it comes" in one.drive.unusable
+
+
+def test_the_motion_of_an_experiment_is_sent_once_and_ends_where_it_began() -> None:
+    """In the place of the multisine, within the limits; the duration ends it at rest."""
+    time = np.arange(401) / RATE
+    moved = 0.2 * np.sin(np.pi * time / 2.0) ** 2
+    speed = np.gradient(moved) * RATE
+    wanted = Trajectory(time=time, position=moved, speed=speed, acceleration=np.gradient(speed) * RATE, limited_by="the design")
+    drive = drive_of(settings().model_copy(update={"duration": 2.0}), planned=Planned(motions={"x": wanted}))
+    assert isinstance(drive, TrajectoryDrive) and "(the design)" in drive.sizes
+    one = Robot(drive)
+    path = one.go(500)
+    one.limits_kept()
+    assert path.max() - START == pytest.approx(0.2, abs=1e-3) and path.min() - START > -1e-3
+    assert drive.state == "stopped" and path[-1] == pytest.approx(START, abs=1e-3) and np.ptp(path[-200:]) == 0.0

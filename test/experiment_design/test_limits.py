@@ -28,6 +28,17 @@ def motion(amplitude: float, volts: float = 1.0) -> Motion:
     return Motion(RATE, volts * np.sin(2 * np.pi * time), amplitude * np.sin(2 * np.pi * time))
 
 
+def test_a_reach_and_a_highest_frequency_bound_the_experiments_of_a_robot() -> None:
+    """The reach counts from the start, with the margin; no band is wider than the highest frequency."""
+    limits = MachineLimits(voltage=2.0, travel=(-1.0, 1.0), reach=0.1, highest=12.5)
+    assert limits.broken(motion(0.09)) == "travel" and limits.broken(motion(0.08)) == ""
+    assert limits.room == pytest.approx(0.085)
+    every = proposals(limits, RATE)
+    assert {item.excitation.high for item in every if item.excitation.kind in ("noise", "sweep")} == {10.0, 12.5}
+    near = neighbours(next(item for item in every if item.excitation.high == 12.5), limits, RATE)
+    assert max(item.excitation.high for item in near) == 12.5
+
+
 def test_it_says_which_limit_a_motion_comes_too_near_to() -> None:
     """Voltage up to the limit; speed, acceleration and travel with a margin."""
     limits = MachineLimits(voltage=2.0, travel=(-0.1, 0.1), speed=0.5, acceleration=3.0, rms=1.0)

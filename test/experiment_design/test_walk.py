@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +18,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, after
 from xy_sysid.experiment_design.rivals import Standing, gained
-from xy_sysid.experiment_design.walk import WalkPlan, step, told
+from xy_sysid.experiment_design.walk import RobotJoint, WalkPlan, step, told
 from xy_sysid.files.walk import plan_document, plan_of, replayed, step_document, write_walk
 from xy_sysid.imports import save
 from xy_sysid.samples.recording import Recording
@@ -56,6 +57,13 @@ def test_a_walk_settles_and_its_bags_decide_the_same_again(tmp_path: Path) -> No
 def test_a_plan_is_read_as_it_was_written() -> None:
     """Limits, budget and sets; missing limits stay missing."""
     plan = WalkPlan("x", limits(LAG), Budget(experiments=3), LAG.sets)
+    assert plan_of(json.loads(json.dumps(plan_document(plan))), STANDARD) == plan
+
+
+def test_the_plan_of_a_robot_is_read_as_it_was_written() -> None:
+    """The joint, its topic and its trajectories; reach and highest frequency are limits like others."""
+    asked = replace(limits(LAG), reach=0.3, highest=25.0)
+    plan = WalkPlan("x", asked, Budget(), LAG.sets, robot=RobotJoint("elbow", "/joint_states", 200.0, 1))
     assert plan_of(json.loads(json.dumps(plan_document(plan))), STANDARD) == plan
 
 

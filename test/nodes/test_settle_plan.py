@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers.ros_tools import needs_ros, new_domain
@@ -94,3 +95,38 @@ def test_a_joint_whose_controller_holds_its_position_is_refused() -> None:
         plan_of(Wishes("x", Path("new")), settings)
     with pytest.raises(BadInput, match="axis is 'z'"):
         plan_of(Wishes("z", Path("new")), settings)
+
+
+def test_a_joint_that_takes_trajectories_has_the_limits_of_its_motion() -> None:
+    """``limit`` is the reach and not a voltage; points as the excitation sends them; the effort is that of the joint, in the diagnoser's unit."""
+    from xy_sysid.nodes.settle import Effort, Wishes, plan_of
+
+    joint = AxisExcitation(kind="multisine", rms=0.0, limit=0.3, max_speed=1.0, max_acceleration=8.0, travel_min=-1.5, travel_max=1.5)
+    ways: dict[str, Any] = {"output": "commands", "interface": "position", "command": "joint_trajectory", "unit": "rad", "rate": 200.0}
+    settings = ExcitationSettings(axes={"x": joint}, joints=["x=elbow"], joint_topic="/joint_states", **ways)
+    plan = plan_of(Wishes("x", Path("new")), settings, Effort(2, "A"))
+    assert (plan.limits.reach, plan.limits.highest, plan.limits.units) == (0.3, 25.0, ("A", "rad"))
+    assert plan.robot is not None and (plan.robot.joint, plan.robot.topic, plan.robot.points, plan.robot.effort_lag) == (
+        "elbow",
+        "/joint_states",
+        200.0,
+        2,
+    )
+    assert plan_of(Wishes("x", Path("new")), settings).limits.units == ("N m", "rad")
+
+
+def test_an_effort_that_no_node_reads_is_not_guessed(said: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its unit and age would be wrong without a word: nothing moves, and one line says what to start."""
+    from xy_sysid.nodes.settle import Settler, Wishes
+
+    joint = AxisExcitation(kind="multisine", rms=0.0, limit=0.3, max_speed=1.0, max_acceleration=8.0, travel_min=-1.5, travel_max=1.5)
+    ways: dict[str, Any] = {"output": "commands", "interface": "position", "command": "joint_trajectory", "unit": "rad", "rate": 200.0}
+    monkeypatch.setattr(Settler, "settings", lambda _: ExcitationSettings(axes={"x": joint}, **ways))
+    monkeypatch.setattr(Settler, "state", lambda _: "unconfigured")
+    monkeypatch.setattr(Settler, "parameters", lambda *_: {"effort_as_voltage": False})
+    settler = Settler(Wishes("x", tmp_path / "walk", alone=True), said.append, lambda: False, lambda: True)
+    try:
+        assert not settler.run()
+    finally:
+        settler.close()
+    assert len(said) == 1 and "read by neither diagnoser nor identifier" in said[0] and "effort_lag" in said[0]

@@ -144,7 +144,7 @@ def _within_limits(settings: ExcitationSettings, told: Mapping[str, Any], motion
     for name, values, most, per in (("limit", moved, room, ""), speed, acceleration):
         peak = float(np.max(np.abs(values)))
         if peak > most:
-            raise BadInput(f"{where}: motion of axis {axis}", f"up to {peak:.4g} {unit}{per}", f"up to its {name} of {most:g} {unit}{per}", AGAIN)
+            raise BadInput(f"{where}: motion of axis {axis}", f"up to {peak:.4g} {unit}{per}", f"up to {most:.4g} {unit}{per}, by its {name}", AGAIN)
     step = own.max_acceleration / rate
     if abs(moved[-1]) > step / rate or max(abs(motion.speed[0]), abs(motion.speed[-1])) > step:
         raise BadInput(f"{where}: motion of axis {axis}", "one that does not end at rest where it began", "one that does", "Make the file again.")

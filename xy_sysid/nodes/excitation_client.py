@@ -21,7 +21,7 @@ from xy_sysid.settings import ExcitationSettings, build, knobs
 ANSWER = 10.0  # s to wait for an answer of the excitation while its node is present
 ASKED = 3  # attempts
 APPEARS = 60.0  # s to wait for the excitation node
-SOON = 1.0  # s instead, if the user wants to stop: a running excitation must still receive the request
+SOON = 1.0  # s instead, if the user wants to stop, since a running excitation must still receive the request; and for a node that may be absent
 NODE = "excitation"
 
 

@@ -34,7 +34,7 @@ from xy_sysid.files.trajectories import as_csv
 from xy_sysid.files.walk import plan_document, write_walk
 from xy_sysid.nodes.common import NAMESPACE
 from xy_sysid.nodes.convert import from_message
-from xy_sysid.nodes.excitation_client import NODE, ExcitationClient
+from xy_sysid.nodes.excitation_client import ASKED, NODE, ExcitationClient
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.processes.settle_process import Decider, DecisionNews
 from xy_sysid.settings import ExcitationSettings, knobs
@@ -45,6 +45,7 @@ FIRST = 12.0  # s of the first recording, with the excitation at the beginning o
 WHOLE = 0.95  # part of its duration after which an experiment counts as complete; a shorter one was stopped
 LATE = 10.0  # s of wall-clock time without a sample after which a recording ends
 SETTLES = 0.5  # s in which the excitation publishes its state after a change
+READERS = ("diagnoser", "identifier")
 QUALITY = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
 
 
@@ -65,7 +66,7 @@ class Wishes:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """The effort in joint states, as the diagnoser reads it. lag: samples by which it is older than its stamp; unit: empty if not known."""
+    """The effort in joint states, as the diagnoser reads it. lag: samples by which it is older than its stamp; unit: empty: N m or N."""
 
     lag: int = 0
     unit: str = ""
@@ -280,12 +281,13 @@ class Settler(ExcitationClient):
             self.problem = self.problem or str(problem)
 
     def _effort(self) -> Effort:
-        """The effort as the diagnoser reads it, or the identifier; the usual one if neither runs."""
-        for name in ("diagnoser", "identifier"):
+        """The effort as the diagnoser reads it, or the identifier. Raises BadInput if neither does."""
+        for name in READERS * ASKED:
             told = self.parameters(name, ("effort_lag", "input_unit", "effort_as_voltage"))
             if told.get("effort_as_voltage"):
                 return Effort(int(told["effort_lag"]), str(told["input_unit"]))
-        return Effort()
+        act = "Start one of them with effort_as_voltage, effort_lag and input_unit, as in config/ros2_trajectory.yaml."
+        raise BadInput("effort of the joint", "read by neither diagnoser nor identifier", "one that tells its unit and age", act)
 
     # subscriptions
 
