@@ -121,6 +121,13 @@ PAIRS = (
         {"low": 0.5, "high": 100.0, "rms": 0.5},
         sized=("cubic",),
     ),
+    Pair(
+        "drag with the square of speed or a drive that warms, at rising speed",
+        (("quadratic_drag",), ("gain_drift",)),
+        ({"quadratic_drag": {"coefficient": 40.0}}, {"gain_drift": {"rate": -0.05}}),
+        {"low": 5.0, "high": 100.0, "rms": 0.005, "slow": 0.5, "slow_period": 16.0, "centring": 0.0},
+        sized=("coefficient", "rate"),
+    ),
     replace(HANGING, name=f"{HANGING.name} (MuJoCo)", machine="mujoco hinge"),
     Pair(
         "load or Coulomb friction, seen in one direction (MuJoCo)",
