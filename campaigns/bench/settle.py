@@ -51,7 +51,7 @@ def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> 
     for item in proposals(asked, setting.layout.sampling_rate):
         told = item.excitation
         broadband = told.kind == "noise" and told.slow == 0.0 and told.low == 0.1 and told.high > 50.0
-        if broadband and not judge(setting, beliefs, asked, item).broken:
+        if broadband and not judge(setting, beliefs, asked, 1, 1, item).broken:
             return NextChoice(item)
     return NextChoice(None)
 

@@ -44,8 +44,11 @@ PLACES = _number("places", 0.75, "1", "part of the room to either side at which 
 # how experiments are judged
 LOOKED = _number("looked", 8.0, "s", "simulated part of each experiment: two periods of the longest sweep; the rest is extrapolated")
 COARSE = _number("coarse", 4000.0, "Hz", "rate of the sub-steps of these simulations, as in a screening fit")
-ROUNDS = _number("rounds", 2, "steps", "Gauss-Newton steps that refit a rival to the experiment: one for a linear law, one more for a nonlinear one")
-FINAL = _number("final", 6, "experiments", "evaluated with all draws, after all experiments were evaluated with the most likely one")
+ROUNDS = _number("rounds", 20, "steps", "that refit a rival to the experiment, at most: nearly all converge in ten")
+CONVERGED = _number("converged", 0.1, "nats", "gain of a step below which a rival is refitted: a tenth of the smallest evidence that counts")
+TRIALS = _number("trials", 5, "steps", "of which each is ten times more damped, before a refit ends")
+DAMPED = _number("damped", 1e-2, "1", "least damping after a step that does not help, as usual (Marquardt 1963)")
+FINAL = _number("final", 6, "experiments", "that are compared in full for precision, after all were compared with the most likely parameters")
 ALIKE = _number("alike", 0.1, "1", "probabilities that differ by less are alike: they are means over few draws")
 ENOUGH = _number("enough", 0.95, "1", "fraction of the highest probability of an experiment at which it ends")
 CYCLES = _number("cycles", 2, "1", "least number of fitted and held-out blocks in an experiment: with fewer than four own windows it settles nothing")

@@ -1,26 +1,29 @@
 """The experiment within the limits that distinguishes some sets of effects in the shortest time.
 
-First every proposal is judged with the most likely model of each set. Then the best ones are judged with draws of the parameters, and then their
-neighbours. The measure is the time in seconds after which the true set is distinguished from its rivals with 95 % probability, averaged over sets
-and draws. If no experiment achieves this, the measure is the probability at its end.
+Every proposal is judged roughly, with the most likely model of each set, and the most promising ones with draws of the parameters and refitted
+rivals; then the neighbours of the best. The measure is the time in seconds after which the true set is distinguished from its rivals with 95 %
+probability, averaged over sets and draws. If no experiment achieves this, the measure is the probability at its end.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, FINAL, JUDGED, NO_EVIDENCE, ROUNDS, SURE
+from xy_sysid.experiment_design.criteria import ALIKE, BLOCK, COARSE, ENOUGH, JUDGED, NO_EVIDENCE, ROUNDS, SURE
 from xy_sysid.experiment_design.evidence import Power, powers, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.prediction import Setting, seen
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.hypotheses.criteria import DOUBTFUL
+
+STAGES: tuple[tuple[int | None, int], ...] = ((1, 1), (1, ROUNDS), (None, ROUNDS))  # draws and rounds of the evaluations of an experiment
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class Judged:
 
     seconds: of steady motion after which the sets are distinguished with 95 %, infinite if the limit of duration does not suffice; probability: of
     this at the end; each: powers of each draw; broken: name of a limit that it would exceed, with margin, or empty; shortest: least duration, s
+    stage: of ``STAGES``
     """
 
     experiment: Experiment
@@ -37,6 +41,7 @@ class Judged:
     each: tuple[tuple[Power, ...], ...] = ()
     broken: str = ""
     shortest: float = 0.0
+    stage: int = 0
 
     @property
     def order(self) -> tuple[float, float, float]:
@@ -94,31 +99,43 @@ def design(
 ) -> Design:
     """The best experiment for some beliefs; tell: called with the progress, 0..1."""
     setting, rate = replace(setting, ramp=limits.ramp), setting.layout.sampling_rate
+    rough, closer = partial(judge, setting, beliefs, limits, *STAGES[0]), partial(judge, setting, beliefs, limits)
+    judged: list[Judged] = []
     first = proposals(limits, rate, seed)
-    judged = []
     for number, proposal in enumerate(first):
-        judged.append(judge(setting, beliefs, limits, proposal, draws=1))
+        judged.append(rough(proposal))
         tell(0.6 * (number + 1) / len(first))
-    allowed = sorted((item for item in judged if not item.broken), key=lambda item: item.order)
-    final: list[Judged] = []
-    for item in allowed:
-        closer = judge(setting, beliefs, limits, item.experiment)
-        final += [] if closer.broken else [closer]
-        if len(final) == FINAL:
-            break
-    tell(0.8)
-    final.sort(key=lambda item: item.order)
-    if final:
-        near = (judge(setting, beliefs, limits, item) for item in neighbours(final[0].experiment, limits, rate))
-        final = sorted([*final, *(item for item in near if not item.broken)], key=lambda item: item.order)
-    tell(1.0)
     none = Design(beliefs=tuple(beliefs), limits=limits, best=None, tried=(), rate=rate)
-    for number, item in enumerate(final):
-        best = _timed(item, limits)
-        final[number] = replace(item, broken=none.broken(best.experiment))
-        if not final[number].broken:
-            return replace(none, best=best, tried=(*final, *judged))
-    return replace(none, tried=(*final, *judged))
+    best = next(best_first(judged, closer), None)
+    tell(0.8)
+    if best is not None:
+        judged += map(rough, neighbours(best.experiment, limits, rate))
+    for item in best_first(judged, closer):
+        timed = _timed(item, limits)
+        if not none.broken(timed.experiment):
+            tell(1.0)
+            return replace(none, best=timed, tried=tuple(judged))
+    return replace(none, tried=tuple(judged))
+
+
+def best_first(judged: list[Judged], closer: Callable[[int | None, int, Experiment], Judged]) -> Iterator[Judged]:
+    """Experiments in the order of their exact evaluations, best first.
+
+    An early evaluation is optimistic: with few rounds a rival is not refitted. So the most promising one is always evaluated more closely, until
+    it is exact. judged: early evaluations, replaced by closer ones; closer: evaluates with a number of draws and of rounds
+    """
+    given: set[int] = set()
+    while True:
+        waiting = [number for number, item in enumerate(judged) if not item.broken and number not in given]
+        if not waiting:
+            return
+        number = min(waiting, key=lambda number: judged[number].order)
+        item = judged[number]
+        if item.stage < len(STAGES) - 1:
+            judged[number] = replace(closer(*STAGES[item.stage + 1], item.experiment), stage=item.stage + 1)
+            continue
+        given.add(number)
+        yield item
 
 
 def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimits, experiment: Experiment) -> str:
@@ -127,8 +144,8 @@ def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimi
     return next((word for model in models if (word := limits.broken(move(model, rate, drive, COARSE)))), "")
 
 
-def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, experiment: Experiment, draws: int | None = None) -> Judged:
-    """The evaluation of one experiment; draws: number of draws of each set, None: all."""
+def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, draws: int | None, rounds: int, experiment: Experiment) -> Judged:
+    """The evaluation of one experiment; draws: number of draws of each set, None: all; rounds: of the refits of its rivals."""
     told = experiment.excitation
     seconds = max(setting.looked, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + limits.ramp)
     looked = [(number, model) for number, belief in enumerate(beliefs) for model in belief.draws[:draws]]
@@ -138,7 +155,6 @@ def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, ex
         broken = limits.broken(motions[-1])
         if broken:
             return Judged(experiment, broken=broken)
-    rounds = 1 if draws else ROUNDS
     pairs = zip(looked, motions, strict=True)
     each = [tuple(powers(beliefs, number, model, seen(setting, motion), rounds)) for (number, model), motion in pairs]
     most = limits.seconds - limits.ramp

@@ -12,14 +12,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.diagnosis.sets import contains
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.criteria import JUDGED, ODDS, ROUNDS, SURE
+from xy_sysid.experiment_design.criteria import CONVERGED, DAMPED, JUDGED, ODDS, ROUNDS, SURE, TRIALS
 from xy_sysid.experiment_design.prediction import Recorded, expected_error, predicted, slopes
 from xy_sysid.hypotheses.criteria import PRICE
+from xy_sysid.samples.block import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,33 +58,42 @@ def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Record
 def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> float:
     """Expected log likelihood ratio over a recording's windows: a model of the first set against the second set, refitted to that recording.
 
-    Both include the penalty from the present data.
+    Both include the penalty from the present data. The refit (Levenberg-Marquardt) ends when it converges; fewer rounds give an upper bound.
     """
     own, rival = sets
     least, count = expected_error(item, own), item.windows.begins.size
-    lines = item.objective.lines > 0.0
-    weight = (lines / np.sqrt(least))[item.windows.layout.band]
+    excited, layout = item.objective.lines > 0.0, item.windows.layout
     centre = rival.inner(rival.model)
-    inner = centre.copy()
-    best = math.inf
-    for last in range(rounds + 1):
-        other = rival.moved(inner)
-        now = predicted(item, other)
-        error = item.velocity - now
-        power = item.windows.layout.power(error)
-        if not np.all(np.isfinite(power)):
-            break
+
+    def scored(inner: FloatArray) -> tuple[float, NDArray[np.complex128], FloatArray]:
+        """Nats of the rival with these coordinates, its prediction, and the power of its error with what explains the truth's, (bands,)."""
+        now = predicted(item, rival.moved(inner))
+        power = least + layout.power(item.velocity - now)
         off = inner - centre
-        score = item.objective.of_power(least + power)
-        best = min(best, item.objective.nats(score, count) + 0.5 * float(off @ rival.precision @ off))
-        if last == rounds:
-            break
-        columns = (slopes(item, rival, other, now) * weight).reshape(inner.size, -1).view(np.float64)
-        left = (error * weight).ravel().view(np.float64)
+        score = item.objective.nats(item.objective.of_power(power), count) if np.all(np.isfinite(power)) else math.inf
+        return score + 0.5 * float(off @ rival.precision @ off), now, power
+
+    inner, damping = centre.copy(), 0.0
+    best, now, power = scored(inner)
+    for _ in range(rounds if math.isfinite(best) else 0):
+        weight = (excited / np.sqrt(item.objective.spectrum(power)))[layout.band]
+        columns = (slopes(item, rival, rival.moved(inner), now) * weight).reshape(inner.size, -1).view(np.float64)
+        left = ((item.velocity - now) * weight).ravel().view(np.float64)
         if not np.all(np.isfinite(columns)):
             break
-        inner = inner + np.linalg.lstsq(columns @ columns.T + rival.precision, columns @ left - rival.precision @ off)[0]
-        inner = rival.scale.inner(rival.scale.outer(inner))
+        normal = columns @ columns.T + rival.precision
+        right = columns @ left - rival.precision @ (inner - centre)
+        gained = 0.0
+        for _ in range(TRIALS):
+            step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), right)[0]
+            moved = rival.scale.inner(rival.scale.outer(inner + step))
+            found = scored(moved)
+            if found[0] < best:
+                gained, inner, damping, (best, now, power) = best - found[0], moved, 0.1 * damping, found
+                break
+            damping = max(10.0 * damping, DAMPED)
+        if gained < CONVERGED:
+            break
     drawn = own.inner(model) - own.inner(own.model)
     truth = item.objective.nats(item.objective.of_power(least), count) + 0.5 * float(drawn @ own.precision @ drawn)
     return max(best - truth, 0.0) if math.isfinite(best) else 1e6
