@@ -15,8 +15,8 @@ from xy_sysid.axis.model import STANDARD
 from xy_sysid.diagnosis.answer import Answer
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Evidence, believed
-from xy_sysid.experiment_design.criteria import ODDS
-from xy_sysid.experiment_design.design import Design, Judged, _timed, expects
+from xy_sysid.experiment_design.criteria import ODDS, ROUNDS
+from xy_sysid.experiment_design.design import Design, Judged, _timed, best_first, expects
 from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
@@ -81,6 +81,42 @@ def test_sets_with_the_same_equations_are_told_by_no_experiment(data: AxisData) 
     own, other = (believed(evidence, fits[0], 1, seed) for seed in (0, 1))
     item = recorded(Setting.of(data), LOUD, own.model, 0.0, 4.0)
     assert nats((own, other), own.model, item) < 1e-6
+
+
+def test_a_rival_that_can_be_refitted_to_an_experiment_is_no_evidence() -> None:
+    """In fast noise a drag along the travel is refitted to a gain along it, in more than one step; a motion over the whole travel shows both."""
+    pair = next(pair for pair in PAIRS if "position_dependent_gain" in pair.sets[0])
+    data = prepare_all(2000.0, [first_recording(pair, machine(pair, 0, 3), 3)])
+    gain, drag = sorted(
+        beliefs_of(data, STANDARD, standing(data, STANDARD, pair.sets), limits(pair).travel, 1), key=lambda item: item.effects[0], reverse=True
+    )
+    assert gain.effects == ("position_dependent_gain",)
+
+    def evidence(told: AxisExcitation, rounds: int) -> float:
+        return nats((gain, drag), gain.model, recorded(Setting.of(data), Experiment(told, 8.0), gain.model, 0.0, 8.0), rounds)
+
+    noise = AxisExcitation(kind="noise", low=20.0, high=300.0, rms=1.0)
+    steps = AxisExcitation(kind="step", period=0.1, rms=4.75)
+    assert evidence(noise, 1) > 50.0 * evidence(noise, ROUNDS)
+    assert evidence(steps, ROUNDS) > 10.0 * evidence(noise, ROUNDS)
+
+
+def test_the_best_experiment_is_exact_and_the_hopeless_ones_stay_rough() -> None:
+    """An early evaluation is optimistic; what is worse even so is not evaluated again, and broken ones never are."""
+    seconds = {"a": (2.0, 9.0, 9.0), "b": (4.0, 5.0, 6.0), "c": (20.0, 21.0, 22.0), "d": (1.0, 1.0, 1.0)}
+    asked: list[str] = []
+
+    def closer(draws: int | None, rounds: int, experiment: Experiment) -> Judged:
+        name = "abcd"[int(experiment.seconds)]
+        asked.append(name)
+        return Judged(experiment, seconds=seconds[name][asked.count(name)], probability=1.0)
+
+    judged = [
+        Judged(Experiment(LOUD.excitation, float(k)), seconds=seconds[name][0], broken="travel" * (name == "d")) for k, name in enumerate("abcd")
+    ]
+    order = best_first(judged, closer)
+    assert [int(next(order).experiment.seconds) for _ in range(2)] == [1, 0]
+    assert sorted(asked) == ["a", "a", "b", "b"]
 
 
 def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
