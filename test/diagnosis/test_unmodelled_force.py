@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,9 @@ from helpers.simulated import recorded
 from xy_sysid.axis.model import AxisModel, simulate
 from xy_sysid.diagnosis.as_json import answer_document
 from xy_sysid.diagnosis.diagnose import diagnose
+from xy_sysid.diagnosis.unmodelled import unmodelled_force
+from xy_sysid.greybox.axis_data import prepare
+from xy_sysid.greybox.free_run import fit_base
 
 RATE = 2000.0
 
@@ -41,3 +45,12 @@ def test_where_friction_is_named_the_force_is_what_it_leaves() -> None:
     found = diagnose(RATE, *recorded("coulomb_friction", seconds=20.0).axis("x"))
     assert found.effects == ("coulomb_friction",)
     assert found.force is not None and found.force.rms < 0.1 * found.final.parameter("coulomb_friction.coulomb").value
+
+
+def test_an_error_that_is_no_force_names_none() -> None:
+    """The same power in all bands is an unmodelled motion: the most likely force is 0, and no number of it is told."""
+    data = prepare(RATE, *recorded("", seconds=20.0).axis("x"))
+    base = fit_base(data)
+    power = data.floor.power + 100.0 * float(np.max(data.floor.power))
+    flat = replace(base, held_out_powers=np.tile(power, (base.held_out_powers.shape[0], 1)))
+    assert unmodelled_force(data, flat) is None
