@@ -12,9 +12,9 @@ from helpers.simulated import recorded
 from xy_sysid.axis.model import AxisModel, simulate
 from xy_sysid.diagnosis.as_json import answer_document
 from xy_sysid.diagnosis.diagnose import diagnose
-from xy_sysid.diagnosis.unmodelled import unmodelled_force
+from xy_sysid.diagnosis.unmodelled import UnmodelledForce
+from xy_sysid.diagnosis.words import not_in_library
 from xy_sysid.greybox.axis_data import prepare
-from xy_sysid.greybox.free_run import fit_base
 
 RATE = 2000.0
 
@@ -38,6 +38,9 @@ def test_a_force_that_no_effect_explains_is_told_with_its_size_and_its_frequenci
     low, high = found.force.mostly
     assert 6.0 < low < high < 25.0
     assert "This corresponds to an unmodelled force of" in found.sentence and "V rms" in found.sentence
+    none = replace(found, force=UnmodelledForce(((8.0, 20.0, 1e-31),), found.force.input))
+    data = prepare(RATE, voltage, np.concatenate(([0.0], np.cumsum(moved))) / RATE)
+    assert "force" not in not_in_library(data, none)  # the likeliest force is 0, which a search only approaches
 
 
 def test_where_friction_is_named_the_force_is_what_it_leaves() -> None:
@@ -45,12 +48,3 @@ def test_where_friction_is_named_the_force_is_what_it_leaves() -> None:
     found = diagnose(RATE, *recorded("coulomb_friction", seconds=20.0).axis("x"))
     assert found.effects == ("coulomb_friction",)
     assert found.force is not None and found.force.rms < 0.1 * found.final.parameter("coulomb_friction.coulomb").value
-
-
-def test_an_error_that_is_no_force_names_none() -> None:
-    """The same power in all bands is an unmodelled motion: the most likely force is 0, and no number of it is told."""
-    data = prepare(RATE, *recorded("", seconds=20.0).axis("x"))
-    base = fit_base(data)
-    power = data.floor.power + 100.0 * float(np.max(data.floor.power))
-    flat = replace(base, held_out_powers=np.tile(power, (base.held_out_powers.shape[0], 1)))
-    assert unmodelled_force(data, flat) is None

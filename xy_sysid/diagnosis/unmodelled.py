@@ -43,8 +43,7 @@ def unmodelled_force(data: AxisData, fit: GreyboxFit) -> UnmodelledForce | None:
     """Of the held-out error of a fit, by the machine's response to a force at the motor (``Floor.response``), which acts as its input does.
 
     What the objective takes for noise or for an unmodelled motion is no force: where the machine hardly answers, that would be huge.
-    None of a fit that is judged one sample ahead, of one that runs away, where nothing is excited or stands out of the noise, and where all of it is
-    more likely such a motion.
+    None of a fit that is judged one sample ahead, of one that runs away, and where nothing is excited or stands out of the noise.
     """
     layout, response = data.layout, data.floor.response
     seen = data.floor.excited & (response > 0.0)
@@ -53,8 +52,6 @@ def unmodelled_force(data: AxisData, fit: GreyboxFit) -> UnmodelledForce | None:
         return None
     edges, each = layout.edges(), 2.0 * layout.lines / layout.length
     force, motion = Objective.of(data.floor).unmodelled(fit.power)
-    if force * float(np.max(response[seen] / data.floor.power[seen])) < np.finfo(np.float64).eps:  # the likeliest is 0, which is only approached
-        return None
     share = force / (force * response + motion + data.floor.power)  # of each band's power that is a force's, over |G|^2
     bands = tuple((float(edges[k]), float(edges[k + 1]), math.sqrt(float(each[k] * beyond[k] * share[k]))) for k in np.flatnonzero(seen).tolist())
     return UnmodelledForce(bands, float(np.std(data.voltage)))

@@ -17,6 +17,8 @@ from xy_sysid.hypotheses.criteria import AT_FLOOR, DOUBTFUL
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import bare, listed, moved
 
+EPS = float(np.finfo(np.float64).eps)
+
 
 def missing(data: AxisData, found: Answer, unsure: Sequence[str], with_all: float) -> str:
     """These effects are missing. unsure: effects that may also be missing; with_all: the confidence if they are named as well."""
@@ -53,7 +55,7 @@ def not_in_library(data: AxisData, found: Answer) -> str:
     beyond, motion = data.layout.rms(_beyond_noise(data, base)), max(data.layout.rms(data.floor.motion), 1e-300)
     said = f"Not in the library: no effect explains the error of the rigid model ({moved(base.held_out_error, unit)}). "
     said += f"Error above the encoder noise: {moved(beyond, unit)}, {percent(beyond / motion)} of the motion{_mostly(data, base)}."
-    if found.force is not None:
+    if found.force is not None and found.force.rms > EPS * found.force.input:  # a likeliest force of 0 is only approached
         low, high = found.force.mostly
         force, drive = (moved(value, data.units.input) for value in (found.force.rms, found.force.input))
         said += f" This corresponds to an unmodelled force of {force} rms at the motor (input: {drive}), mostly between {low:.3g} and {high:.3g} Hz."
