@@ -80,7 +80,7 @@ def test_sets_with_the_same_equations_are_told_by_no_experiment(data: AxisData) 
     evidence = Evidence(data)
     own, other = (believed(evidence, fits[0], 1, seed) for seed in (0, 1))
     item = recorded(Setting.of(data), LOUD, own.model, 0.0, 4.0)
-    assert nats((own, other), own.model, item) < 1e-6
+    assert nats((own, other), own.model, item)[0] < 1e-6
 
 
 def test_a_rival_that_can_be_refitted_to_an_experiment_is_no_evidence() -> None:
@@ -93,7 +93,7 @@ def test_a_rival_that_can_be_refitted_to_an_experiment_is_no_evidence() -> None:
     assert gain.effects == ("position_dependent_gain",)
 
     def evidence(told: AxisExcitation, rounds: int) -> float:
-        return nats((gain, drag), gain.model, recorded(Setting.of(data), Experiment(told, 8.0), gain.model, 0.0, 8.0), rounds)
+        return nats((gain, drag), gain.model, recorded(Setting.of(data), Experiment(told, 8.0), gain.model, 0.0, 8.0), rounds)[0]
 
     noise = AxisExcitation(kind="noise", low=20.0, high=300.0, rms=1.0)
     steps = AxisExcitation(kind="step", period=0.1, rms=4.75)

@@ -45,11 +45,11 @@ class Judged:
 
     @property
     def order(self) -> tuple[float, float, float]:
-        """Sort key, smaller is better: duration if it decides, else probability; then evidence per second."""
-        rate = sum(min((one.rate for one in item), default=0.0) for item in self.each)
+        """Sort key, smaller is better: duration if it decides, else probability; then evidence after the least duration."""
+        evidence = sum(min((one.after(self.shortest) for one in item), default=0.0) for item in self.each)
         if math.isfinite(self.seconds):
-            return max(self.seconds + self.experiment.ramp, self.shortest), 0.0, -rate
-        return math.inf, -round(self.probability / ALIKE), -rate
+            return max(self.seconds + self.experiment.ramp, self.shortest), 0.0, -evidence
+        return math.inf, -round(self.probability / ALIKE), -evidence
 
     def lasting(self, seconds: float) -> Judged:
         """The experiment with this duration, and its evaluation."""
@@ -85,8 +85,8 @@ class Design:
     def alike(self) -> bool:
         """True if no experiment within the machine's limits gives evidence for any draw of the sets."""
         looked = [item for item in self.tried if item.each]
-        most = max((one.rate for item in looked for draw in item.each for one in draw), default=math.inf)
-        return most * JUDGED * self.limits.seconds < NO_EVIDENCE
+        most = max((one.after(self.limits.seconds) for item in looked for draw in item.each for one in draw), default=math.inf)
+        return JUDGED * most < NO_EVIDENCE
 
     @property
     def helps(self) -> bool:
@@ -147,7 +147,8 @@ def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimi
 def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, draws: int | None, rounds: int, experiment: Experiment) -> Judged:
     """The evaluation of one experiment; draws: number of draws of each set, None: all; rounds: of the refits of its rivals."""
     told = experiment.excitation
-    seconds = max(setting.looked, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + limits.ramp)
+    shortest = setting.shortest()
+    seconds = max(setting.looked, shortest, min(2.0 * told.slow_period * (told.slow > 0.0), limits.seconds) + limits.ramp)
     looked = [(number, model) for number, belief in enumerate(beliefs) for model in belief.draws[:draws]]
     motions = []
     for _, model in looked:
@@ -156,10 +157,11 @@ def judge(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, dr
         if broken:
             return Judged(experiment, broken=broken)
     pairs = zip(looked, motions, strict=True)
-    each = [tuple(powers(beliefs, number, model, seen(setting, motion), rounds)) for (number, model), motion in pairs]
+    steady = 0.5 * seconds  # what happens once, as the way to a place, may fall into the windows of the fit, and shows nothing later
+    each = [tuple(powers(beliefs, number, model, seen(setting, motion, steady), rounds)) for (number, model), motion in pairs]
     most = limits.seconds - limits.ramp
     needed, chance = seconds_needed(each, most), settled(each, most)
-    least = max(setting.shortest(), told.slow_period + limits.ramp if told.slow > 0.0 else 0.0)
+    least = max(shortest, told.slow_period + limits.ramp if told.slow > 0.0 else 0.0)
     return Judged(experiment, seconds=needed, probability=chance, each=tuple(each), shortest=least)
 
 

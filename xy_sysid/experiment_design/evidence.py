@@ -23,19 +23,33 @@ from xy_sysid.experiment_design.prediction import Recorded, expected_error, pred
 from xy_sysid.hypotheses.criteria import PRICE
 from xy_sysid.samples.block import FloatArray
 
+UNLIKE = 1e6  # nats against a rival that runs away
+
 
 @dataclass(frozen=True, slots=True)
 class Power:
-    """Evidence for one draw of one set against one rival: nats per second; price: nats for its additional parameters."""
+    """Evidence for one draw of one set against one rival. price: nats for its additional parameters
+
+    nats: of the ``seen`` seconds that were simulated, with what the rival loses on the present data; rate: nats per second after them. The
+    present data count once: over a longer experiment, the rival gives them up.
+    """
 
     truth: int
     rival: int
     rate: float
     price: float
+    nats: float = 0.0
+    seen: float = 0.0
+
+    def after(self, seconds: float) -> float:
+        """Expected nats after some seconds, an upper bound beyond those that were simulated."""
+        if seconds < self.seen:
+            return self.nats * max(seconds, 0.0) / self.seen
+        return self.nats + self.rate * (seconds - self.seen)
 
     def probability(self, seconds: float) -> float:
         """Probability that the rival is refuted after some seconds: the log likelihood ratio is normal, and its variance is twice its mean."""
-        mean = self.rate * JUDGED * max(seconds, 0.0)
+        mean = JUDGED * self.after(seconds)
         if mean <= 0.0:
             return 0.0
         return float(ndtr((mean - ODDS - self.price) / math.sqrt(2.0 * mean)))
@@ -51,14 +65,16 @@ def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Record
     for number, rival in enumerate(beliefs):
         if number == truth or 0 not in (number, truth) or contains(library, frozenset(rival.effects), frozenset(own.effects)):
             continue
-        found.append(Power(truth, number, nats((own, rival), model, item, rounds) / item.seconds, PRICE * max(own.free - rival.free, 0)))
+        whole, lost = nats((own, rival), model, item, rounds)
+        rate = max(whole - lost, 0.0) / item.seconds
+        found.append(Power(truth, number, rate, PRICE * max(own.free - rival.free, 0), whole, item.seconds))
     return found
 
 
-def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> float:
+def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> tuple[float, float]:
     """Expected log likelihood ratio over a recording's windows: a model of the first set against the second set, refitted to that recording.
 
-    Both include the penalty from the present data. The refit (Levenberg-Marquardt) ends when it converges; fewer rounds give an upper bound.
+    Returns the ratio, and the part of it that the second set loses on the present data. The refit (Levenberg-Marquardt) ends when it converges; fewer rounds give an upper bound.
     """
     own, rival = sets
     least, count = expected_error(item, own), item.windows.begins.size
@@ -96,7 +112,8 @@ def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: 
             break
     drawn = own.inner(model) - own.inner(own.model)
     truth = item.objective.nats(item.objective.of_power(least), count) + 0.5 * float(drawn @ own.precision @ drawn)
-    return max(best - truth, 0.0) if math.isfinite(best) else 1e6
+    off = inner - centre
+    return (max(best - truth, 0.0), 0.5 * float(off @ rival.precision @ off)) if math.isfinite(best) else (UNLIKE, 0.0)
 
 
 def settled(each: Sequence[Sequence[Power]], seconds: float) -> float:

@@ -89,11 +89,11 @@ def recorded(setting: Setting, experiment: Experiment, model: AxisModel, start: 
     return seen(setting, move(model, rate, experiment.drive(rate, setting.looked if seconds is None else seconds, start), COARSE))
 
 
-def seen(setting: Setting, motion: Motion) -> Recorded:
-    """The recording of a motion, from the end of the fade-in on."""
+def seen(setting: Setting, motion: Motion, since: float = 0.0) -> Recorded:
+    """The recording of a motion, from the end of the fade-in on, or from a later instant, s."""
     rate, length = motion.sampling_rate, setting.layout.length
     velocity = np.diff(motion.position) * rate
-    first = min(round(setting.ramp * rate), max(velocity.size - length, 0))
+    first = min(round(max(setting.ramp, since) * rate), max(velocity.size - length, 0))
     windows = Windows(setting.layout, np.arange(first, max(velocity.size - length, first) + 1, max(length // 2, 1), dtype=np.int64))
     least = floor(windows, velocity, setting.encoder, setting.epsilon, motion.voltage[:-1])
     least = least if setting.response is None else replace(least, response=setting.response)
