@@ -48,6 +48,7 @@ ROUNDS = _number("rounds", 20, "steps", "that refit a rival to the experiment, a
 CONVERGED = _number("converged", 0.1, "nats", "gain of a step below which a rival is refitted: a tenth of the smallest evidence that counts")
 TRIALS = _number("trials", 5, "steps", "of which each is ten times more damped, before a refit ends")
 DAMPED = _number("damped", 1e-2, "1", "least damping after a step that does not help, as usual (Marquardt 1963)")
+UNLIKE = _number("unlike", 1e6, "nats", "against a rival that runs away: more than any experiment gives")
 FINAL = _number("final", 6, "experiments", "that are compared in full for precision, after all were compared with the most likely parameters")
 ALIKE = _number("alike", 0.1, "1", "probabilities that differ by less are alike: they are means over few draws")
 ENOUGH = _number("enough", 0.95, "1", "fraction of the highest probability of an experiment at which it ends")

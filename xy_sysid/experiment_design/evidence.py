@@ -18,12 +18,10 @@ from scipy.special import ndtr
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.diagnosis.sets import contains
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.criteria import CONVERGED, DAMPED, JUDGED, ODDS, ROUNDS, SURE, TRIALS
+from xy_sysid.experiment_design.criteria import CONVERGED, DAMPED, JUDGED, ODDS, ROUNDS, SURE, TRIALS, UNLIKE
 from xy_sysid.experiment_design.prediction import Recorded, expected_error, predicted, slopes
 from xy_sysid.hypotheses.criteria import PRICE
 from xy_sysid.samples.block import FloatArray
-
-UNLIKE = 1e6  # nats against a rival that runs away
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +72,8 @@ def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Record
 def nats(sets: tuple[Belief, Belief], model: AxisModel, item: Recorded, rounds: int = ROUNDS) -> tuple[float, float]:
     """Expected log likelihood ratio over a recording's windows: a model of the first set against the second set, refitted to that recording.
 
-    Returns the ratio, and the part of it that the second set loses on the present data. The refit (Levenberg-Marquardt) ends when it converges; fewer rounds give an upper bound.
+    Returns the ratio, and the part of it that the second set loses on the present data. The refit (Levenberg-Marquardt) ends when it converges; fewer
+    rounds give an upper bound.
     """
     own, rival = sets
     least, count = expected_error(item, own), item.windows.begins.size
