@@ -18,7 +18,8 @@ from xy_sysid.experiment_design.as_trajectory import as_trajectory
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.of_run import NextExperiment
-from xy_sysid.settings import AxisExcitation
+from xy_sysid.files.experiment import read_experiment
+from xy_sysid.settings import AxisExcitation, ExcitationSettings, build
 
 LAG = next(pair for pair in PAIRS if "amplifier_lag" in pair.sets[1])
 
@@ -48,6 +49,24 @@ def test_it_says_what_to_run_and_what_to_expect_and_writes_the_file(recording: P
     rows = np.loadtxt(motion.with_suffix(".csv"), delimiter=",", skiprows=1)
     assert len(rows) == len(message["points"]) and np.max(np.abs(rows[:, 1])) < 0.14
     assert "a recording" in refused("next", "--for", "nothing", "--voltage", 5, "--travel=-140:140", "--trajectory", tmp_path / "no.yaml")
+
+
+def test_a_robot_that_takes_only_trajectories_gets_an_experiment_that_its_node_accepts(recording: Path, tmp_path: Path) -> None:
+    """With its run file the limits are those of its motion, the points are as dense as it sends them, and the file names them."""
+    axis = {"kind": "multisine", "rms": 0.0, "limit": 0.05, "max_speed": 1.0, "max_acceleration": 40.0, "low": 1.0, "high": 20.0, "period": 4.0}
+    told = {"output": "commands", "interface": "position", "command": "joint_trajectory", "unit": "m", "rate": 1000.0, "axes": ["x"]}
+    ends = {"travel_min": -0.15, "travel_max": 0.15, "brake": 0.02}
+    run_file = tmp_path / "robot.yaml"
+    run_file.write_text(yaml.safe_dump({"nodes": [{"executable": "excitation", "parameters": {**told, "x": {**axis, **ends}}}]}))
+    sets, out = ("--between", "rigid", "--between", "amplifier_lag"), tmp_path / "next.yaml"
+    said = cli("next", recording, *sets, "--params", run_file, "--trajectory", tmp_path / "motion.yaml", "-o", out)
+    assert said.code == 0, said
+    experiment = yaml.safe_load(out.read_text())["experiment"]
+    rows = np.loadtxt(tmp_path / experiment["motion"], delimiter=",", skiprows=1)
+    assert experiment["motion"] == "motion.csv" and rows[1, 0] == pytest.approx(1e-3)
+    assert np.abs(rows[:, 1] - rows[0, 1]).max() <= 0.05 and np.abs(rows[:, 3]).max() <= 40.0
+    settings = build(ExcitationSettings, {**told, "axes": {"x": AxisExcitation(**{**axis, **ends})}})
+    assert set(read_experiment(settings, out).planned.motions) == {"x"}
 
 
 @pytest.mark.parametrize(

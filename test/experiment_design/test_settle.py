@@ -22,7 +22,8 @@ from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, Question, Signals, settle
 from xy_sysid.experiment_design.precision import Precision, sharpest
-from xy_sysid.experiment_design.prediction import Setting, recorded
+from xy_sysid.experiment_design.prediction import Setting, recorded, seen
+from xy_sysid.experiment_design.proposals import proposals
 from xy_sysid.experiment_design.rivals import beliefs_of, possible, standing
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import fit
@@ -127,6 +128,26 @@ def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
     needed = seconds_needed([[one]], 1000.0)
     assert settled([[one]], needed) == pytest.approx(0.95, abs=1e-6)
     assert seconds_needed([[one]], 0.5 * needed) == np.inf
+
+
+def test_the_present_data_count_once_and_not_for_every_second() -> None:
+    """Of 12 nats in 4 s the rival loses 8 on the present data; of a longer experiment only the other 4 grow."""
+    one = Power(truth=0, rival=1, rate=1.0, price=0.0, nats=12.0, seen=4.0)
+    assert [one.after(seconds) for seconds in (-1.0, 0.0, 2.0, 4.0, 10.0)] == [0.0, 0.0, 6.0, 12.0, 18.0]
+
+
+def test_what_an_experiment_shows_once_on_the_way_is_no_evidence_for_its_whole_duration() -> None:
+    """A joint that is pulled to another place and held there by a quiet signal: gravity and a spring differ on the way only."""
+    pair = next(pair for pair in PAIRS if pair.sets[0] == ("gravity",))
+    data = prepare_all(1000.0, [first_recording(pair, machine(pair, 0, 3), 3)])
+    beliefs = beliefs_of(data, STANDARD, standing(data, STANDARD, pair.sets), limits(pair).travel, 1)
+    setting = Setting.of(data)
+    held = next(item for item in proposals(limits(pair), 1000.0) if item.excitation.offset > 0.0 and item.excitation.rms < 0.01)
+    gravity = next(belief for belief in beliefs if belief.effects == ("gravity",))
+    spring = next(belief for belief in beliefs if belief.effects == ("return_spring",))
+    motion = recorded(setting, held, gravity.model, 0.0).motion
+    whole, steady = (nats((gravity, spring), gravity.model, seen(setting, motion, since))[0] for since in (0.0, 0.5 * setting.looked))
+    assert whole > 4.0 * steady
 
 
 def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:
