@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import PurePath
 from typing import Any, NamedTuple, Protocol, get_type_hints
 
 import numpy as np
@@ -197,7 +196,7 @@ def motion_file(document: object, where: str) -> str:
     """The name of the file with the motion of a document, empty without one. Raises BadInput for a name that is not of a file beside it."""
     told = document.get("experiment") if isinstance(document, Mapping) else None
     name = told.get("motion", "") if isinstance(told, Mapping) else ""
-    if not isinstance(name, str) or PurePath(name).name != name:
+    if not isinstance(name, str) or "/" in name or "\\" in name or name in (".", ".."):
         raise BadInput(f"{where}: motion", repr(name), "the name of a file beside it", "Make the file again.")
     return name
 

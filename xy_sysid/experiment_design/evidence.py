@@ -65,7 +65,8 @@ def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Record
             continue
         whole, lost = nats((own, rival), model, item, rounds)
         rate = max(whole - lost, 0.0) / item.seconds
-        found.append(Power(truth, number, rate, PRICE * max(own.free - rival.free, 0), whole, item.seconds))
+        price = PRICE * max(own.free - rival.free, 0)
+        found.append(Power(truth=truth, rival=number, rate=rate, price=price, nats=whole, seen=item.seconds))
     return found
 
 
