@@ -13,6 +13,7 @@ from campaigns.bench.settle import table
 from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, left_limits, limits, machine
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.diagnosis.answer import Answer
+from xy_sysid.diagnosis.of_run import diagnose
 from xy_sysid.errors import BadInput
 from xy_sysid.experiment_design.beliefs import Evidence, believed
 from xy_sysid.experiment_design.criteria import ODDS, ROUNDS
@@ -21,6 +22,7 @@ from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, set
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, Question, Signals, settle
+from xy_sysid.experiment_design.of_run import next_experiment
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded, seen
 from xy_sysid.experiment_design.proposals import proposals
@@ -148,6 +150,14 @@ def test_what_an_experiment_shows_once_on_the_way_is_no_evidence_for_its_whole_d
     motion = recorded(setting, held, gravity.model, 0.0).motion
     whole, steady = (nats((gravity, spring), gravity.model, seen(setting, motion, since))[0] for since in (0.0, 0.5 * setting.looked))
     assert whole > 4.0 * steady
+
+
+def test_base_or_screw_is_asked_of_a_person() -> None:
+    """One motor encoder sees the same equations: no experiment is proposed, and the answer asks for another payload."""
+    found = diagnose([recorded_machine("base_resonance", seconds=20.0).run("x")])
+    asked = next_experiment(found, MachineLimits(voltage=5.0, travel=(-0.14, 0.14)))
+    assert asked.experiment is None and asked.sets == (("base_resonance",), ("screw_compliance",))
+    assert "are the same: no experiment can favour one of them" in asked.sentence and "Change the payload" in asked.ask
 
 
 def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:

@@ -51,6 +51,10 @@ class Judged:
             return max(self.seconds + self.experiment.ramp, self.shortest), 0.0, -evidence
         return math.inf, -round(self.probability / ALIKE), -evidence
 
+    def most(self, seconds: float) -> float:
+        """The largest evidence of a draw after some seconds, nats on what is judged."""
+        return JUDGED * max((one.after(seconds) for draw in self.each for one in draw), default=0.0)
+
     def lasting(self, seconds: float) -> Judged:
         """The experiment with this duration, and its evaluation."""
         steady = seconds - self.experiment.ramp
@@ -84,9 +88,7 @@ class Design:
     @property
     def alike(self) -> bool:
         """True if no experiment within the machine's limits gives evidence for any draw of the sets."""
-        looked = [item for item in self.tried if item.each]
-        most = max((one.after(self.limits.seconds) for item in looked for draw in item.each for one in draw), default=math.inf)
-        return JUDGED * most < NO_EVIDENCE
+        return max((item.most(self.limits.seconds) for item in self.tried if item.each), default=math.inf) < NO_EVIDENCE
 
     @property
     def helps(self) -> bool:
@@ -113,9 +115,29 @@ def design(
     for item in best_first(judged, closer):
         timed = _timed(item, limits)
         if not none.broken(timed.experiment):
-            tell(1.0)
-            return replace(none, best=timed, tried=tuple(judged))
+            none = replace(none, best=timed)
+            break
+    if not none.helps:
+        _look_for_evidence(judged, closer, limits.seconds)
+    tell(1.0)
     return replace(none, tried=tuple(judged))
+
+
+def _look_for_evidence(judged: list[Judged], closer: Callable[[int | None, int, Experiment], Judged], seconds: float) -> None:
+    """Evaluate what could give evidence more closely, until one experiment exactly does, or none could."""
+    while True:
+        number = max((k for k, item in enumerate(judged) if item.each), key=lambda k: judged[k].most(seconds), default=-1)
+        if number < 0 or judged[number].most(seconds) < NO_EVIDENCE or not _look_closer(judged, number, closer):
+            return
+
+
+def _look_closer(judged: list[Judged], number: int, closer: Callable[[int | None, int, Experiment], Judged]) -> bool:
+    """Replace one evaluation by the next closer one; False if it is exact."""
+    item = judged[number]
+    if item.stage == len(STAGES) - 1:
+        return False
+    judged[number] = replace(closer(*STAGES[item.stage + 1], item.experiment), stage=item.stage + 1)
+    return True
 
 
 def best_first(judged: list[Judged], closer: Callable[[int | None, int, Experiment], Judged]) -> Iterator[Judged]:
@@ -130,12 +152,9 @@ def best_first(judged: list[Judged], closer: Callable[[int | None, int, Experime
         if not waiting:
             return
         number = min(waiting, key=lambda number: judged[number].order)
-        item = judged[number]
-        if item.stage < len(STAGES) - 1:
-            judged[number] = replace(closer(*STAGES[item.stage + 1], item.experiment), stage=item.stage + 1)
-            continue
-        given.add(number)
-        yield item
+        if not _look_closer(judged, number, closer):
+            given.add(number)
+            yield judged[number]
 
 
 def broken_in_time(models: Sequence[AxisModel], rate: float, limits: MachineLimits, experiment: Experiment) -> str:
