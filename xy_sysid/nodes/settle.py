@@ -153,6 +153,11 @@ class Settler(ExcitationClient):
         wishes.folder.mkdir(parents=True, exist_ok=False)
         decider = Decider(plan_document(plan), wishes.effect_files)
         try:
+            self.doing = "starting"
+            while not self._over() and decider.news() is None:  # nothing moves while this computer is busy loading it
+                self.wait(0.05)
+            if self._over():
+                return
             bag = self._first(settings)
             while not self.ending:
                 news = self._decided(decider, bag)

@@ -35,7 +35,7 @@ class DecisionNews:
 
 
 class Decider:
-    """ask(bag) for each recording in turn, then ``news`` until it returns a step or a problem."""
+    """ask(bag) for each recording in turn, then ``news`` until it returns a step or a problem. The first news tells that it is loaded."""
 
     def __init__(self, plan: dict[str, Any], effect_files: tuple[str, ...] = ()) -> None:
         """plan: its document."""
@@ -79,6 +79,7 @@ def work(pipe: Connection, told: dict[str, Any], effect_files: tuple[str, ...]) 
     plan = plan_of(told, library([Path(file).expanduser() for file in effect_files]))
     runs, before = [], None
     try:
+        pipe.send(DecisionNews())
         while True:
             bag = Path(pipe.recv())
             with Attempt() as attempt:
