@@ -158,7 +158,9 @@ def test_the_whole_page_follows_the_story_from_failing_to_explained(usual: Tab, 
         seen.until(functools.partial(explained, seen, 2), 60, "not explained")
         assert seen.ladder()[1] < 1.2 and "at the noise floor" in seen.verdict() and "missing" not in (seen.headline() + seen.verdict()).lower()
         assert seen.fact("gain") != gain and seen.page.locator(".fact.unsure").count() == 0
-        measured, model = seen.curves("Measured and modelled over frequency, bode", "measured, 95 % band", "model with coulomb friction")
+        drawn = functools.partial(seen.curves, "Measured and modelled over frequency, bode", "measured, 95 % band", "model with coulomb friction")
+        seen.until(lambda drawn=drawn: all(len(curve) > 3 for curve in drawn()), 20, "the model with friction is not drawn")
+        measured, model = drawn()
         assert abs(measured[3] - model[3]) < 0.5
     assert one.filled() == ["Download the model"] and "coulomb friction" in str(one.page.locator(".math").first.text_content())
     one.page.get_by_role("button", name="rigid, with delay").click()
