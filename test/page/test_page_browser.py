@@ -142,6 +142,14 @@ def failing(one: Tab, steps: int) -> bool:
 FAILS = "Error over the noise floor by frequency"
 
 
+RESPONSE = ("Measured and modelled over frequency, bode", "measured, 95 % band", "model with coulomb friction")
+
+
+def drawn(seen: Tab) -> bool:
+    """Whether the response and that of the model with friction are there."""
+    return all(len(curve) > 3 for curve in seen.curves(*RESPONSE))
+
+
 def test_the_whole_page_follows_the_story_from_failing_to_explained(usual: Tab, tab: Callable[..., Tab]) -> None:
     """Diagnose names it, Add explains it: headline, response, tiles, residual and ladder change together, also in a second tab.
 
@@ -158,9 +166,8 @@ def test_the_whole_page_follows_the_story_from_failing_to_explained(usual: Tab, 
         seen.until(functools.partial(explained, seen, 2), 60, "not explained")
         assert seen.ladder()[1] < 1.2 and "at the noise floor" in seen.verdict() and "missing" not in (seen.headline() + seen.verdict()).lower()
         assert seen.fact("gain") != gain and seen.page.locator(".fact.unsure").count() == 0
-        drawn = functools.partial(seen.curves, "Measured and modelled over frequency, bode", "measured, 95 % band", "model with coulomb friction")
-        seen.until(lambda drawn=drawn: all(len(curve) > 3 for curve in drawn()), 20, "the model with friction is not drawn")
-        measured, model = drawn()
+        seen.until(functools.partial(drawn, seen), 20, "the model with friction is not drawn")
+        measured, model = seen.curves(*RESPONSE)
         assert abs(measured[3] - model[3]) < 0.5
     assert one.filled() == ["Download the model"] and "coulomb friction" in str(one.page.locator(".math").first.text_content())
     one.page.get_by_role("button", name="rigid, with delay").click()
