@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from xy_sysid.effects._contract import USUAL_WITHIN
+from xy_sysid.excitation import trajectory
 from xy_sysid.greybox.axis_data import FITTED_BLOCK, HELD_OUT_BLOCK
 from xy_sysid.hypotheses.criteria import Criteria
 from xy_sysid.settings import AxisExcitation
@@ -61,5 +62,5 @@ DRAWN = _number("drawn", 2, "draws", "draws of the parameters: the interval depe
 SHORTEST = _number("shortest", 4.0, "s", "least duration: a few windows")
 LONGER = _number("longer", 1.4, "1", "factor by which an experiment becomes longer if its rehearsal misses the wanted width")
 MOST_POINTS = _number("most_points", 10000.0, "Hz", "points of a trajectory per second, at most; no joint follows more")
-POINTS_EACH = _number("points", 8.0, "1", "points of a trajectory in a period of the highest frequency that it keeps")
+POINTS_EACH = _number("points", trajectory.POINTS_EACH, "1", "points of a trajectory in a period of the highest frequency that it keeps")
 ORDER = _number("order", 4, "1", "of the zero-phase low-pass that makes a trajectory of a motion")
