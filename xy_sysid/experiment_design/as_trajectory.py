@@ -20,7 +20,7 @@ def as_trajectory(found: NextExperiment, model: AxisModel, rate: float) -> Traje
     Raises BadInput if there is no experiment, for a rate out of range, and for a motion that would exceed a limit of the machine.
     """
     if found.experiment is None:
-        raise BadInput("experiment", "none", "one that helps", "Give wider limits, or another setup.")
+        raise BadInput("experiment", "none", "one that helps", found.sentence or "Give wider limits, or another setup.")
     if not 1.0 <= rate <= MOST_POINTS:
         raise BadInput("points a second", rate, f"1 to {MOST_POINTS:g}", "Give the rate of the trajectory's points.")
     fine = max(found.sampling_rate, rate)
