@@ -128,4 +128,4 @@ def test_a_gain_that_one_recording_alone_shows_is_no_less_sure() -> None:
     alone: Any = SimpleNamespace(steps=[slice(0, 200)], held_out=SimpleNamespace(begins=begins))
     both, pooled = gained(two, one, other), gained(alone, one, other)
     assert both.nats == pooled.nats == pytest.approx(42.0)
-    assert both.error < 0.3 * pooled.error and both.is_sure and not pooled.is_sure
+    assert both.is_sure and not pooled.is_sure

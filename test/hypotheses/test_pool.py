@@ -16,7 +16,7 @@ from xy_sysid.diagnosis.sets import contains
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit, fit_base
-from xy_sysid.hypotheses.compare import gain, size
+from xy_sysid.hypotheses.compare import Gain, gain, size
 from xy_sysid.hypotheses.criteria import AT_FLOOR, MOST_EFFECTS
 from xy_sysid.hypotheses.moves import is_twice, moves
 from xy_sysid.hypotheses.pool import Pool
@@ -142,6 +142,16 @@ def test_the_better_of_two_fits_gains_and_a_fit_gains_nothing_over_itself(both: 
     assert same.nats == 0.0 and same.probability == 0.5 and not same.is_sure
     assert size(best.fit, rigid.fit) > 100.0
     assert size(best.fit, best.fit) == 0.0
+
+
+def test_a_gain_in_every_window_is_sure_however_much_it_differs_and_one_in_a_single_window_is_not() -> None:
+    """As of a spring, which acts most where the axis is far out."""
+
+    def of(*each: float) -> Gain:
+        return Gain(np.array(each), np.zeros(len(each), dtype=np.int64))
+
+    assert of(147.0, 150.0, 286.0, 165.0, 145.0, 144.0, 152.0, 158.0, 150.0, 150.0, 149.0, 1413.0).is_sure
+    assert not of(0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1, 1413.0).is_sure
 
 
 def test_a_quick_fit_never_takes_the_place_of_one_on_all_data() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from xy_sysid.axis.model import AxisModel, Library
 from xy_sysid.diagnosis.answer import Answer, Rung, Tried
@@ -124,9 +123,8 @@ def _tried(pool: Pool, base: GreyboxFit, node: Node, doubt: float = 0.0) -> Trie
 
 def _doubt(node: Node, other: Node) -> float:
     """Probability that another set predicts better than the one that was taken, parameters at their price; at most a half, as it was not taken."""
-    found = gain(*comparable_fits(node, other))
-    priced = replace(found, nats=found.nats + PRICE * (other.parameters - node.parameters))
-    return min(1.0 - priced.probability, 0.5)
+    found = gain(*comparable_fits(node, other)).priced(PRICE * (other.parameters - node.parameters))
+    return min(1.0 - found.probability, 0.5)
 
 
 def _of_one_step(

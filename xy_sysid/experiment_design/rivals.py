@@ -20,7 +20,7 @@ from xy_sysid.experiment_design.criteria import ALLOWED, DRAWS
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit, fit
 from xy_sysid.hypotheses.compare import Gain, gain
-from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, OVERLAP, PRICE
+from xy_sysid.hypotheses.criteria import CHANCE, DOUBTFUL, PRICE
 from xy_sysid.hypotheses.moves import is_twice
 
 
@@ -83,19 +83,8 @@ def _of_one_law(library: Library, names: Sequence[tuple[str, ...]], fits: Sequen
 
 
 def gained(data: AxisData, one: GreyboxFit, other: GreyboxFit) -> Gain:
-    """``gain`` over the windows of several recordings; its error does not include the difference between recordings.
-
-    A stratified sample (Cochran, Sampling techniques, 1977, ch. 5): each recording has its own mean, and 0 if it has only one window.
-    """
-    found = gain(one, other)
-    if len(data.steps) < 2 or not math.isfinite(found.nats):
-        return found
-    each = other.scores - one.scores
-    ends = [step.start for step in data.steps]
-    parts = [each[np.searchsorted(ends, data.held_out.begins, side="right") == k + 1] for k in range(len(ends))]
-    parts = [part for part in parts if part.size]
-    variance = sum(part.size * (float(np.var(part, ddof=1)) if part.size > 1 else float(part[0] ** 2)) for part in parts)
-    return Gain(found.nats, math.sqrt(OVERLAP * variance), each.size / OVERLAP - len(parts) + 1)
+    """``gain`` over the windows of one or several recordings."""
+    return gain(one, other, np.searchsorted([step.start for step in data.steps], data.held_out.begins, side="right"))
 
 
 def _from_the_best(data: AxisData, names: Sequence[str], found: GreyboxFit, best: GreyboxFit) -> GreyboxFit:
@@ -118,7 +107,7 @@ def _from_the_best(data: AxisData, names: Sequence[str], found: GreyboxFit, best
 
 
 def _doubt(found: Gain, price: float) -> float:
-    return min(1.0 - Gain(found.nats + price, found.error, found.windows).probability, 0.5)
+    return min(1.0 - found.priced(price).probability, 0.5)
 
 
 def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisModel | None) -> GreyboxFit:

@@ -3,47 +3,66 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from xy_sysid.greybox.free_run import GreyboxFit
 from xy_sysid.hypotheses.criteria import CHANCE, OVERLAP
+from xy_sysid.samples.block import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """nats: gain of one fit over another on all held-out windows; error: its standard error; windows: number of independent windows."""
+    """Gain of one fit over another.
 
-    nats: float
-    error: float
-    windows: float
+    each: (windows,) nats of each held-out window, which half overlap; recording: (windows,) index of the recording of each
+    """
+
+    each: FloatArray
+    recording: NDArray[np.int64]
+
+    @property
+    def nats(self) -> float:
+        """On all windows."""
+        return float(np.sum(self.each))
 
     @property
     def probability(self) -> float:
-        """Probability that it is better, 0..1, by Student's t over the windows."""
+        """Probability that it is better, 0..1, by Student's t over the windows, of the roots of their gains.
+
+        A gain grows with the square of the motion by an effect. Where an effect acts more in one window than in others, as a spring does far out,
+        the gains differ so much that a test of their mean would take them for chance. The recordings are strata of a sample: each has its own mean,
+        and 0 if it has only one window (Cochran, Sampling Techniques, 1977, ch. 5).
+        """
         if not math.isfinite(self.nats):
             return float(self.nats > 0.0)
-        if self.error == 0.0:
+        root = np.sign(self.each) * np.sqrt(np.abs(self.each))
+        parts = [root[self.recording == k] for k in np.unique(self.recording)]
+        variance = OVERLAP * sum(part.size * (float(np.var(part, ddof=1)) if part.size > 1 else float(part[0] ** 2)) for part in parts)
+        if variance == 0.0:
             return 0.5 if self.nats == 0.0 else float(self.nats > 0.0)
-        return float(scipy.stats.t.cdf(self.nats / self.error, max(self.windows - 1.0, 1.0)))
+        return float(scipy.stats.t.cdf(float(np.sum(root)) / math.sqrt(variance), max(root.size / OVERLAP - len(parts), 1.0)))
 
     @property
     def is_sure(self) -> bool:
         """More than chance."""
         return self.probability > CHANCE
 
+    def priced(self, nats: float) -> Gain:
+        """With this many nats more, for parameters, spread over the windows."""
+        return replace(self, each=self.each + nats / self.each.size)
 
-def gain(one: GreyboxFit, other: GreyboxFit) -> Gain:
-    """Gain of one fit over another of the same data, paired over windows."""
-    if not np.all(np.isfinite(one.scores)):
-        return Gain(-math.inf, 0.0, 1.0)
-    if not np.all(np.isfinite(other.scores)):
-        return Gain(math.inf, 0.0, 1.0)
-    each = other.scores - one.scores
-    spread = float(np.std(each, ddof=1)) * math.sqrt(OVERLAP * each.size) if each.size > 1 else math.inf
-    return Gain(float(np.sum(each)), spread, each.size / OVERLAP)
+
+def gain(one: GreyboxFit, other: GreyboxFit, recording: NDArray[np.int64] | None = None) -> Gain:
+    """Gain of one fit over another of the same data, paired over windows; recording: (windows,) the recording of each, by default one."""
+    if np.all(np.isfinite(one.scores)) and np.all(np.isfinite(other.scores)):
+        each = other.scores - one.scores
+    else:
+        each = np.full(one.scores.size, math.inf if np.all(np.isfinite(one.scores)) else -math.inf)
+    return Gain(each, np.zeros(each.size, dtype=np.int64) if recording is None else recording)
 
 
 def size(one: GreyboxFit, before: GreyboxFit) -> float:
