@@ -83,7 +83,7 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
     merged(tmp_path, [row("a.npz"), row("b.npz", machine="mill-02")])
     (tmp_path / "mill-02.parquet").write_bytes(b"PAR1 rubbish")
     for act in (lambda: read(tmp_path), lambda: merged(tmp_path, [row("c.npz", machine="mill-02")])):
-        with pytest.raises(BadRecording, match=r"mill-02\.parquet: cannot be read as Parquet .* Remove it"):
+        with pytest.raises(BadRecording, match=r"mill-02\.parquet: cannot be read as Parquet .* move it away and run xy-sysid fleet again"):
             act()
 
 

@@ -375,6 +375,16 @@ def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:
     assert "machine is mill-99; allowed: one of mill-00, mill-01, mill-02." in refused("trend", table, "--machine", "mill-99")
 
 
+@pytest.mark.parametrize("name", ["long.csv", "page.html", "long.parquet"])
+def test_a_recording_in_place_of_a_table_is_never_to_be_removed(name: str, tmp_path: Path) -> None:
+    """--every is missing; a file that is not a table's is named as such."""
+    path = tmp_path / name
+    path.write_text("t,u,y\n", encoding="utf-8")
+    said = refused("trend", path)
+    assert "Remove" not in said
+    assert "add --every 10min" in said or name.endswith(".parquet")
+
+
 def test_one_machine_has_the_trend_that_it_has_among_all(table: Path) -> None:
     """--machine selects the output, not the axes from which the wander is learned."""
     (one,) = xy.trend(table, machines=["mill-01"]).trends

@@ -81,6 +81,9 @@ def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
     Raises BadRecording if it is not a table of a fleet.
     """
     pa = arrow()
+    if folder.is_file() and folder.suffix != ENDING:
+        act = "Give the folder that xy-sysid fleet made; to compare the parts of one recording, add --every 10min."
+        raise BadRecording(folder, "not a table of a fleet", act)
     files = _files(folder)
     if not files:
         raise BadRecording(folder, "no Parquet files in it", "Make the table first: xy-sysid fleet PATH -o TABLE.")
@@ -112,7 +115,7 @@ def _of_file(file: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
     try:
         return pa.parquet.read_table(file, columns=None if names is None else list(names), partitioning=None)
     except (OSError, pa.ArrowException) as error:
-        act = "Remove it, and run xy-sysid fleet again."
+        act = "If xy-sysid fleet made it, move it away and run xy-sysid fleet again."
         raise BadRecording(file, f"cannot be read as Parquet ({_first_line(error)})", act) from None
 
 
