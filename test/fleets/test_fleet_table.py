@@ -87,6 +87,23 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
             act()
 
 
+@pytest.mark.parametrize("name", ["m" * 250, "\u65e5" * 90, "mill\udcff", "." * 250, "a/b"])
+def test_any_name_of_a_machine_has_a_file(name: str, tmp_path: Path) -> None:
+    """A long name, one in another script, and a folder's name that is not UTF-8; names with the same beginning have different files."""
+    merged(tmp_path, [row("a.npz", machine=name), row("b.npz", machine=f"{name}2"), row("c.npz")])
+    merged(tmp_path, [row("a.npz", machine=name)])
+    assert sorted(table(tmp_path, "source")) == [("a.npz",), ("b.npz",), ("c.npz",)]
+    assert len(list(tmp_path.glob("*.parquet"))) == 3
+
+
+def test_a_damaged_file_of_a_machine_does_not_keep_the_others_out_of_the_table(tmp_path: Path) -> None:
+    """Machines before and after it in the alphabet have their rows, and the error names the file."""
+    (tmp_path / "mill-02.parquet").write_bytes(b"PAR1 rubbish")
+    with pytest.raises(BadRecording, match=r"mill-02\.parquet"):
+        merged(tmp_path, [row(f"{number}.npz", machine=f"mill-0{number}") for number in (1, 2, 3)])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mill-01.parquet", "mill-02.parquet", "mill-03.parquet"]
+
+
 def test_a_recording_is_found_once_and_any_process_finds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By relative and absolute path; a process of a cluster has another working directory."""
     (tmp_path / "data").mkdir()

@@ -26,6 +26,7 @@ ENDING = ".parquet"
 ORDER = ["machine", "axis", "date", "source"]
 KNOWS = ("source", "file_sha256", "date", "axis")  # columns that identify a recording
 NAMED = re.compile(r"[^\w.-]+")
+LONGEST = 255 - len(f"-01234567{ENDING}")  # bytes of a machine in a file name: file systems allow 255 with hash and ending
 
 
 def arrow() -> Any:
@@ -56,12 +57,19 @@ def _told(item: Column) -> dict[str, str]:
 
 
 def as_table(rows: Iterable[Row], library: Library = STANDARD) -> pyarrow.Table:
-    """The rows in the table's order; columns unknown to the library, for example of another run's own effects, come last."""
+    """The rows in the table's order; columns unknown to the library, for example of another run's own effects, come last.
+
+    A byte of a path that is not UTF-8 becomes a question mark, since Parquet cannot hold it.
+    """
     pa, known = arrow(), schema(library)
-    ordered = sorted(rows, key=_place)
+    ordered = sorted(({name: _text(value) for name, value in row.items()} for row in rows), key=_place)
     others = dict.fromkeys(name for row in ordered for name in row if name not in known.names)
     more = [pa.field(name, pa.infer_type([row.get(name) for row in ordered])) for name in others]
     return pa.Table.from_pylist(ordered, schema=pa.schema([*known, *more]))
+
+
+def _text(value: Any) -> Any:
+    return value.encode(errors="replace").decode() if isinstance(value, str) else value
 
 
 def _place(row: Row) -> tuple[str, str, bool, datetime | None, str]:
@@ -127,24 +135,35 @@ def merged(folder: Path, rows: Iterable[Row], library: Library = STANDARD) -> No
     """Merge rows into the table.
 
     A recording replaces rows of the same source, with any machine name, and rows of the same content and name under another
-    source. Values that the new rows do not contain are kept, with their columns.
+    source. Values that the new rows do not contain are kept, with their columns. If a machine's file cannot be read or written, the rows of all
+    other machines are merged nevertheless, and then BadRecording is raised.
     """
     new: dict[str, list[Row]] = {}
     for row in rows:
         new.setdefault(row["machine"], []).append(row)
     sources = {row["source"] for own in new.values() for row in own}
     places = {folder / file_name(machine): own for machine, own in new.items()}
+    problems = []
     for path in sorted({*_files(folder), *places}):
-        own = _each_once(places.get(path, []))
-        stays = _stay(path, sources, own) if path.is_file() else []
-        if own and any(stays):
-            write(_together(_of_file(path).filter(stays), as_table(own, library)), path)
-        elif own:
-            write(as_table(own, library), path)
-        elif not any(stays):
-            path.unlink()
-        elif not all(stays):
-            write(_of_file(path).filter(stays), path)
+        try:
+            _merged(path, sources, _each_once(places.get(path, [])), library)
+        except BadRecording as problem:
+            problems.append(problem)
+    if problems:
+        raise problems[0]
+
+
+def _merged(path: Path, sources: Collection[str], own: Sequence[Row], library: Library) -> None:
+    """Merge its own rows into a machine's file, and remove rows of ``sources``; a file without rows is removed."""
+    stays = _stay(path, sources, own) if path.is_file() else []
+    if own and any(stays):
+        write(_together(_of_file(path).filter(stays), as_table(own, library)), path)
+    elif own:
+        write(as_table(own, library), path)
+    elif not any(stays):
+        path.unlink()
+    elif not all(stays):
+        write(_of_file(path).filter(stays), path)
 
 
 def _stay(path: Path, sources: Collection[str], own: Sequence[Row]) -> list[bool]:
@@ -180,9 +199,9 @@ def _each_once(rows: Sequence[Row]) -> list[Row]:
 
 
 def file_name(machine: str) -> str:
-    """File name for a machine: its name, or a plain form of it with a hash if the name is not a valid file name."""
-    plain = NAMED.sub("_", machine).strip("._") or "machine"
-    return f"{plain}{ENDING}" if plain == machine else f"{plain}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}{ENDING}"
+    """File name for a machine: its name, or a plain and possibly shorter form of it with a hash if the name is not a valid file name."""
+    plain = NAMED.sub("_", machine).encode()[:LONGEST].decode(errors="ignore").strip("._") or "machine"
+    return f"{plain}{ENDING}" if plain == machine else f"{plain}-{hashlib.sha256(machine.encode(errors='surrogateescape')).hexdigest()[:8]}{ENDING}"
 
 
 def rows_so_far(folder: Path, names: Sequence[str]) -> list[Row]:
