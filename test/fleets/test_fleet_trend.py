@@ -23,6 +23,7 @@ from xy_sysid.fleets.causes import causes
 from xy_sysid.fleets.change import changes, evidence, statistic
 from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
+from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import merged
 from xy_sysid.fleets.trends import of_axes, of_rows
 from xy_sysid.fleets.wander import Series, usual
@@ -383,6 +384,29 @@ def test_a_recording_in_place_of_a_table_is_never_to_be_removed(name: str, tmp_p
     said = refused("trend", path)
     assert "Remove" not in said
     assert "add --every 10min" in said or name.endswith(".parquet")
+
+
+@pytest.mark.parametrize("changes", [{"date": "1 May"}, {"gain": "much"}])
+def test_a_table_with_text_in_place_of_dates_or_numbers_is_refused(changes: Row, tmp_path: Path) -> None:
+    """In one line; numbers and dates that another program wrote in another precision are read."""
+    import pyarrow
+    import pyarrow.parquet
+
+    rows = [recorded("mill-00", k, 0.1) for k in range(5)]
+    other = pyarrow.Table.from_pylist(rows).drop_columns("gain_low").append_column("gain_low", pyarrow.array([0.09] * 5, pyarrow.float32()))
+    pyarrow.parquet.write_table(other, tmp_path / "good.parquet")
+    assert len(xy.trend(tmp_path).axes[0].dates) == 5
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist([row | changes for row in rows]), tmp_path / "good.parquet")
+    assert "a column of another kind" in refused("trend", tmp_path)
+
+
+@pytest.mark.parametrize("option", ["--causes", "--names"])
+def test_an_impossible_date_in_a_yaml_file_is_told(option: str, table: Path, tmp_path: Path) -> None:
+    """YAML reads 2026-13-02 as a date."""
+    path = tmp_path / "own.yaml"
+    path.write_text("recordings: {a.csv: {date: 2026-13-02}}", encoding="utf-8")
+    command = ("trend", table, "--causes", path) if option == "--causes" else ("fleet", "--one", path, "--names", path)
+    assert "own.yaml: no YAML. Correct it: month must be in 1..12" in refused(*command)
 
 
 def test_one_machine_has_the_trend_that_it_has_among_all(table: Path) -> None:

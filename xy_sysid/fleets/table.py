@@ -103,6 +103,12 @@ def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
     missing = [name for name in names or ("machine", "axis", "date") if name not in found.column_names]
     if missing:
         raise BadRecording(folder, f"no column {missing[0]!r}", "Give a table that xy-sysid fleet made.")
+    known = schema()
+    kinds = [known.field(field.name) if field.name in known.names else field for field in found.schema]
+    try:
+        found = found.cast(pa.schema(kinds))
+    except pa.ArrowException as error:
+        raise BadRecording(folder, f"a column of another kind ({_first_line(error)})", "Give a table that xy-sysid fleet made.") from None
     return found.select(list(names)) if names is not None else found
 
 
