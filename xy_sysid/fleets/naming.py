@@ -14,7 +14,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import Settings, build, knob
 
-ZONE = r"(?:Z|[+-]\d\d:\d\d|\+\d{4})"
+ZONE = r"(?:Z|[+-]\d\d:\d\d|\+\d\d(?:-?\d\d)?|-(?:0[1-9]|1[0-2])(?:00|30))"  # others after a minus are numbers of runs
 DATE = rf"(?<!\d)\d{{4}}[-_.]?\d\d[-_.]?\d\d(?:[T_ -]?\d\d[-_:]?\d\d(?:[-_:]?\d\d)?{ZONE}?)?(?!\d)"
 PARTS = {"{machine}": r"(?P<machine>[^/]+?)", "{axis}": r"(?P<axis>[^/]+?)", "{date}": f"(?P<date>{DATE})", "*": "[^/]*"}
 FIRST, LAST = datetime(2000, 1, 1, tzinfo=UTC), datetime(2100, 1, 1, tzinfo=UTC)  # dates outside count from another start
@@ -105,8 +105,9 @@ def _said_date(text: str) -> datetime | None:
 
 
 def _date_in(name: str) -> datetime | None:
-    """The first date in the name of a file; None if it has none."""
-    for found in re.finditer(f"(?=({DATE}))", name):
+    """The first date in the name of a file; None if it has none. One with separators comes first, and one after a letter, like SN20440101, last."""
+    dates = re.finditer(f"(?=({DATE}))", name)
+    for found in sorted(dates, key=lambda one: (one.group(1)[4].isdigit(), name[: one.start()][-1:].isalpha())):
         with suppress(BadInput):
             if FIRST <= (date := date_of(found.group(1))) < LAST:
                 return date
@@ -127,7 +128,7 @@ def date_of(text: str) -> datetime:
     """A date, in UTC if no zone is given. Raises BadInput."""
     zone = re.search(rf"{ZONE}$", text)
     local = re.sub(r"[^\d]", "", text[: zone.start()] if zone else text)
-    digits, name = (local, zone.group().replace("Z", "+00:00")) if zone and len(local) in (12, 14) else (re.sub(r"[^\d]", "", text), "+00:00")
+    digits, name = (local, _offset(zone.group())) if zone and len(local) in (12, 14) else (re.sub(r"[^\d]", "", text), "+0000")
     try:
         if re.fullmatch(DATE, text) and len(digits) in (8, 12, 14):
             form = "%Y%m%d%H%M%S"[: {8: 6, 12: 10, 14: 12}[len(digits)]]
@@ -136,6 +137,11 @@ def date_of(text: str) -> datetime:
     except ValueError:
         raise BadInput("date", repr(text), "a day and a time of day", "Write for example 2026-03-03 or 2026-03-03T14:30:00.") from None
     return found.astimezone(UTC) if found.tzinfo else found.replace(tzinfo=UTC)
+
+
+def _offset(zone: str) -> str:
+    """A zone as +hhmm."""
+    return "+0000" if zone == "Z" else zone[0] + re.sub(r"[^\d]", "", zone).ljust(4, "0")
 
 
 def date_within(recording: Recording) -> datetime | None:
