@@ -79,7 +79,8 @@ def fleet(
             bar.update(task, description=now.sentence(), total=now.total, completed=now.done)
             if now.done == 0 and now.place:
                 many, on = "" if now.total == 1 else "s", "" if now.workers == 1 else "es"
-                aside.print(f"{now.total} recording{many} on {now.workers} process{on}; dashboard: {now.place}")
+                where = f" on {now.workers} process{on}" if now.workers else ", waiting for workers of the scheduler"
+                aside.print(f"{now.total} recording{many}{where}; dashboard: {now.place}")
             elif bar.disable and time.perf_counter() - last[0] > EVERY:
                 last[0] = time.perf_counter()
                 aside.print(now.sentence())

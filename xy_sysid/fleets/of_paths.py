@@ -97,6 +97,7 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
             now = dataclasses.replace(
                 now,
                 done=now.done + 1,
+                workers=now.workers or processes(client),
                 unchanged=now.unchanged + done.unchanged,
                 failed=now.failed + any(row.get("problem") for row in done.rows),
                 elapsed=perf_counter() - begun,
