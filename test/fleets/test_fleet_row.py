@@ -13,7 +13,7 @@ from helpers.simulated import recorded
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.errors import BadInput
 from xy_sysid.fleets.columns import TIMES, columns
-from xy_sysid.fleets.naming import Name, Named, Names, name_of, names_from
+from xy_sysid.fleets.naming import Name, Named, Names, name_of, names_from, unused
 from xy_sysid.fleets.of_file import Task, rows_of_file
 from xy_sysid.fleets.row import Plan, Row, row_of
 from xy_sysid.samples.recording import Recording, Run
@@ -148,6 +148,29 @@ def test_a_small_file_names_what_the_path_does_not_tell(tmp_path: Path) -> None:
         name_of(Path("/x/mill/2206-03-03.csv"), names)
     with pytest.raises(BadInput, match="ends with"):
         name_of(Path("/x/old/b.csv"), names)
+
+
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ("{machin: a}", "allowed: machine, axis, date. Did you mean 'machine'?"),
+        ("{machine: , date: 2026-01-02}", "machine is None; allowed: text."),
+        ("{axis: }", "axis is None; allowed: text."),
+        ("text", "recordings.a.csv is 'text'; allowed: names with values."),
+        ("{machine: m7, date: 1926-03-03}", "date of a.csv is '1926-03-03'; allowed: a year from 2000 to 2099."),
+        ("{machine: m7, date: May}", "date of a.csv is 'May'; allowed: a day and a time of day."),
+    ],
+)
+def test_a_mistake_in_a_file_of_names_is_told_before_any_work(entry: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "names.yaml"
+    file.write_text(f"recordings: {{a.csv: {entry}}}", encoding="utf-8")
+    assert words in refused("fleet", npz(tmp_path / "a.npz", rows=100), "-o", tmp_path / "table", "--names", file)
+
+
+def test_an_entry_that_names_no_recording_is_found() -> None:
+    """An end of a path begins with the whole name of a folder or file."""
+    names = Names(recordings={end: Named(machine="m") for end in ("/x/old/a.csv", "old/a.csv", "a.csv", "ld/a.csv")})
+    assert unused(names, [Path("/x/old/a.csv")]) == ("ld/a.csv",)
 
 
 @pytest.mark.parametrize("pattern", ["{machin}/*", "{machine}/{machine}"])

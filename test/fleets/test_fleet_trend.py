@@ -282,6 +282,21 @@ def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
         causes(own)
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("causes: [{cause: hose, wenn: [gain down]}]", "allowed: cause, when, also, check. Did you mean 'when'?"),
+        ("causes: [{when: [gain down]}]", "cause 1 is without a name"),
+        ("", "causes is None; allowed: a list."),
+    ],
+)
+def test_a_mistake_in_a_file_of_causes_is_told_with_what_is_allowed_there(text: str, words: str, tmp_path: Path) -> None:
+    own = tmp_path / "causes.yaml"
+    own.write_text(text, encoding="utf-8")
+    with pytest.raises(BadInput, match=re.escape(words)):
+        causes(own)
+
+
 def test_a_quantity_of_a_user_comes_before_those_of_the_package(tmp_path: Path) -> None:
     """A column in both files measures the quantity of the user's file."""
     own = tmp_path / "causes.yaml"

@@ -93,6 +93,8 @@ def fleet(
     say(f"{out}: {now.sentence()}.")
     if now.failed:
         say("  The columns problem and stage say why there is no answer.")
+    if now.unused:
+        say(f"  Entries of {names} that fit no recording: {', '.join(now.unused)}.")
 
 
 def _one(path: Path, out: Path | None, how: Analysis, force: bool) -> None:

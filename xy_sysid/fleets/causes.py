@@ -51,7 +51,9 @@ def causes(own: Path | None = None) -> Causes:
     theirs = _read(own)
     quantities = {**theirs.quantities, **ours.quantities, **theirs.quantities}  # the user's patterns are tried first and take precedence
     both = Causes(quantities=quantities, causes=[*theirs.causes, *ours.causes])
-    for one in theirs.causes:
+    for number, one in enumerate(theirs.causes, 1):
+        if not one.cause:
+            raise BadInput(f"{own}: cause {number}", "without a name", "one with a name", "Write what may have happened: cause: a worn nut.")
         if not one.when:
             raise BadInput(f"{own}: when of {one.cause!r}", "empty", "one change or more", "Write the change that points to it, such as gain down.")
         for change in (*one.when, *one.also):

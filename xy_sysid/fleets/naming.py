@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -68,8 +69,23 @@ def names_from(path: Path) -> Names:
 
 
 def _dated(value: Any) -> Any:
-    """The value as text: YAML converts 2026-03-03 to a date."""
-    return {key: one if isinstance(one, str) else str(one) for key, one in value.items()} if isinstance(value, dict) else value
+    """The value as text: YAML converts 2026-03-03 to a date. An empty value stays empty, which is refused."""
+    return {key: one if one is None else str(one) for key, one in value.items()} if isinstance(value, dict) else value
+
+
+def check(names: Names) -> None:
+    """Raises BadInput for an invalid pattern, or an invalid date of a recording."""
+    if names.pattern:
+        compiled(names.pattern)
+    for end, one in names.recordings.items():
+        _said_date(one.date, f"date of {end}")
+
+
+def unused(names: Names, paths: Iterable[Path]) -> tuple[str, ...]:
+    """The entries of ``recordings`` that name none of these recordings."""
+    whole = [path.absolute().as_posix() for path in paths]
+    ends = {place[found.start() :].removeprefix("/") for place in whole for found in re.finditer("/", place)} | {*whole}
+    return tuple(end for end in names.recordings if end not in ends)
 
 
 def name_of(path: Path, names: Names) -> Name:
@@ -96,11 +112,11 @@ def name_of(path: Path, names: Names) -> Name:
     return Name(machine or path.absolute().parent.name, axis, date, said=bool(machine))
 
 
-def _said_date(text: str) -> datetime | None:
-    """The date in a text that a user gave as a date; None for an empty text. Raises BadInput."""
-    found = date_of(text) if text else None
+def _said_date(text: str, what: str = "date") -> datetime | None:
+    """The date in a text that a user gave as a date; None for an empty text. Raises BadInput, which says ``what`` it is."""
+    found = date_of(text, what) if text else None
     if found is not None and not FIRST <= found < LAST:
-        raise BadInput("date", repr(text), f"a year from {FIRST.year} to {LAST.year - 1}", "Correct it, or leave it out.")
+        raise BadInput(what, repr(text), f"a year from {FIRST.year} to {LAST.year - 1}", "Correct it, or leave it out.")
     return found
 
 
@@ -124,7 +140,7 @@ def compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(f"(?:^|/){text}$")
 
 
-def date_of(text: str) -> datetime:
+def date_of(text: str, what: str = "date") -> datetime:
     """A date, in UTC if no zone is given. Raises BadInput."""
     zone = re.search(rf"{ZONE}$", text)
     local = re.sub(r"[^\d]", "", text[: zone.start()] if zone else text)
@@ -135,7 +151,7 @@ def date_of(text: str) -> datetime:
             return datetime.strptime(f"{digits} {name}", f"{form} %z").astimezone(UTC)
         found = datetime.fromisoformat(text)
     except ValueError:
-        raise BadInput("date", repr(text), "a day and a time of day", "Write for example 2026-03-03 or 2026-03-03T14:30:00.") from None
+        raise BadInput(what, repr(text), "a day and a time of day", "Write for example 2026-03-03 or 2026-03-03T14:30:00.") from None
     return found.astimezone(UTC) if found.tzinfo else found.replace(tzinfo=UTC)
 
 
