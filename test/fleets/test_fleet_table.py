@@ -115,6 +115,14 @@ def test_a_recording_is_found_once_and_any_process_finds_it(tmp_path: Path, monk
     assert task.path == os.fspath(found) and task.effect_files == (os.fspath(tmp_path / "own.py"),)
 
 
+def test_the_folder_of_the_recordings_is_not_that_of_the_table(tmp_path: Path) -> None:
+    """The error names -o, not missing recordings; the table's folder among others is passed over."""
+    npz(tmp_path / "a.npz", rows=300)
+    assert f"-o is {tmp_path}; allowed: another folder than that of the recordings" in refused("fleet", tmp_path, "-o", tmp_path)
+    (tmp_path / "table").mkdir()
+    assert recordings([tmp_path / "a.npz", tmp_path / "table"], tmp_path / "table") == (tmp_path / "a.npz",)
+
+
 def test_a_recording_that_names_its_machine_is_of_that_machine(tmp_path: Path) -> None:
     """It takes precedence over the folder, which may hold recordings of many machines."""
     folder = tmp_path / "all"
