@@ -173,7 +173,7 @@ def test_an_entry_that_names_no_recording_is_found() -> None:
     assert unused(names, [Path("/x/old/a.csv")]) == ("ld/a.csv",)
 
 
-@pytest.mark.parametrize("pattern", ["{machin}/*", "{machine}/{machine}"])
+@pytest.mark.parametrize("pattern", ["{machin}/*", "{machine}/{machine}", "{ machine }/*", "/{machine}/*", "./*.npz", "{machine}/"])
 def test_a_pattern_that_means_nothing_is_refused(pattern: str, tmp_path: Path) -> None:
     """In one line, before any work."""
     npz(tmp_path / "a.npz", rows=100)

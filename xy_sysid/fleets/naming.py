@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -81,6 +81,15 @@ def check(names: Names) -> None:
         _said_date(one.date, f"date of {end}")
 
 
+def fits(names: Names, paths: Sequence[Path]) -> None:
+    """Raises BadInput if the pattern fits none of the recordings, and ``recordings`` names none of them."""
+    if names.pattern and paths and set(unused(names, paths)) == {*names.recordings}:
+        pattern = compiled(names.pattern)
+        if not any(pattern.search(path.absolute().as_posix()) for path in paths):
+            allowed = f"one that fits the end of the path of a recording, for example of {paths[0]}"
+            raise BadInput("pattern", repr(names.pattern), allowed, f"Write for example {EXAMPLE}.")
+
+
 def unused(names: Names, paths: Iterable[Path]) -> tuple[str, ...]:
     """The entries of ``recordings`` that name none of these recordings."""
     whole = [path.absolute().as_posix() for path in paths]
@@ -132,8 +141,8 @@ def _date_in(name: str) -> datetime | None:
 
 def compiled(pattern: str) -> re.Pattern[str]:
     """The pattern as a regular expression. Raises BadInput for unknown names in braces, or a repeated name."""
-    text = "".join(PARTS.get(part, re.escape(part)) for part in re.split(r"(\{\w*\}|\*)", pattern))
-    unknown = [part for part in re.findall(r"\{\w*\}", pattern) if part not in PARTS]
+    text = "".join(PARTS.get(part, re.escape(part)) for part in re.split(r"(\{[^}]*\}|\*)", pattern))
+    unknown = [part for part in re.findall(r"\{[^}]*\}", pattern) if part not in PARTS]
     twice = [part for part in PARTS if part != "*" and pattern.count(part) > 1]
     if unknown or twice:
         raise BadInput("pattern", repr(pattern), "{machine}, {axis} and {date}, each once, and *", f"Write for example {EXAMPLE}.")

@@ -17,7 +17,7 @@ from xy_sysid.fleets.engine import Cluster, connected, dask, processes, results
 from xy_sysid.fleets.estimate import Progress
 from xy_sysid.fleets.finding import recordings
 from xy_sysid.fleets.journal import journal
-from xy_sysid.fleets.naming import Names, check, unused
+from xy_sysid.fleets.naming import Names, check, fits, unused
 from xy_sysid.fleets.of_file import Done, Task, rows_of_file
 from xy_sysid.fleets.reference import COLUMNS, References
 from xy_sysid.fleets.table import Known, arrow, as_table, read, rows_so_far
@@ -82,6 +82,7 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
     dask()
     how.check()
     found = recordings([paths] if isinstance(paths, (str, Path)) else paths, folder)
+    fits(how.names, found)
     with journal(folder, library(how.effect_files)) as kept, ExitStack() as stack:
         before = rows_so_far(folder, COLUMNS)
         known = Known(before, {str(path) for path in found})
