@@ -180,6 +180,12 @@ def test_a_pattern_that_means_nothing_is_refused(pattern: str, tmp_path: Path) -
     assert "pattern is" in refused("fleet", tmp_path, "-o", tmp_path / "table", "--pattern", pattern)
 
 
+def test_one_recording_that_does_not_exist_is_a_mistake(tmp_path: Path) -> None:
+    """A misspelt path in cron is an error; a file that exists and cannot be read is a row."""
+    assert "--one is nothere.csv; allowed: a recording that exists" in refused("fleet", "--one", "nothere.csv", "-o", tmp_path / "row.parquet")
+    assert not (tmp_path / "row.parquet").exists()
+
+
 def test_one_recording_is_a_document_or_a_file(tmp_path: Path) -> None:
     """For external engines: one file in, one row per axis out, in this process."""
     path = npz(tmp_path / "2026-03-03.npz", rows=6_000)

@@ -65,6 +65,8 @@ def fleet(
     said = said.model_copy(update={"pattern": pattern or said.pattern, "follow": [*said.follow, *(follow or [])]})
     how = Analysis(names=said, reading=reading, effect_files=tuple(map(str, effect_file or ())))
     if one is not None:
+        if not one.exists():
+            raise BadInput("--one", str(one), "a recording that exists", "Check the path.")
         _one(one, out, how, force)
         return
     if not paths or out is None:
