@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -71,7 +72,16 @@ def test_what_cannot_be_read_is_a_row_that_says_why(tmp_path: Path) -> None:
     assert row["machine"] == "mill-07" and row["date"] == datetime(2026, 3, 3, tzinfo=UTC)
     assert row["stage"] == "reading" and row["problem"].startswith("no voltage column")
     (row,) = rows_of_file(Task(str(tmp_path / "gone.csv"))).rows
-    assert row["problem"].startswith("cannot be read (No such file or directory)")
+    assert row["problem"].startswith("cannot be read (No such file or directory)") and row["date"] is None
+
+
+def test_a_dead_link_or_a_pipe_keeps_the_machine_and_date_of_its_path(tmp_path: Path) -> None:
+    """So trend can say that the newest recording of a machine cannot be read."""
+    (tmp_path / "m7_2026-03-01.csv").symlink_to("nowhere")
+    os.mkfifo(tmp_path / "m7_2026-03-02.csv")
+    names = Names(pattern="{machine}_{date}.csv")
+    rows = [row for path in sorted(tmp_path.iterdir()) for row in rows_of_file(Task(str(path), names)).rows]
+    assert [(row["machine"], row["stage"], row["date"].day) for row in rows] == [("m7", "reading", 1), ("m7", "reading", 2)]
 
 
 def test_an_axis_that_cannot_be_fitted_keeps_what_is_known_of_it() -> None:
