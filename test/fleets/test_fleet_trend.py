@@ -424,6 +424,32 @@ def test_an_impossible_date_in_a_yaml_file_is_told(option: str, table: Path, tmp
     assert "own.yaml: no YAML. Correct it: month must be in 1..12" in refused(*command)
 
 
+@pytest.mark.parametrize("option", [("--axis", "z"), ("--map", "x.input=foo"), ("--span", "0:3"), ("--rate", "100"), ("--velocity",)])
+def test_options_for_a_recording_are_refused_for_a_table(option: tuple[str, ...], table: Path) -> None:
+    """They would change nothing."""
+    assert "without --every" in refused("trend", table, *option)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("trend", "TABLE", "-o", "page.txt"), "page.txt; allowed: a name that ends with .html"),
+        (("fleet", "--one", "FILE", "-o", "row.csv"), "row.csv; allowed: a name that ends with .parquet"),
+        (("fleet", "--one", "FILE", "FILE"), "given with --one"),
+        (("fleet", "--one", "FILE", "--workers", "3"), "given with --one"),
+        (("fleet", "--one", "FILE", "--scheduler", "tcp://here:1"), "given with --one"),
+        (("fleet", "FILE", "-o", "table", "--force"), "--force is given without --one"),
+    ],
+)
+def test_an_option_without_an_effect_is_refused(
+    words: tuple[str, ...], said: str, table: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before any work."""
+    monkeypatch.chdir(tmp_path)
+    path = npz(tmp_path / "a.npz", rows=300)
+    assert said in refused(*({"TABLE": table, "FILE": path}.get(word, word) for word in words))
+
+
 def test_one_machine_has_the_trend_that_it_has_among_all(table: Path) -> None:
     """--machine selects the output, not the axes from which the wander is learned."""
     (one,) = xy.trend(table, machines=["mill-01"]).trends

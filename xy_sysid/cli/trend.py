@@ -49,10 +49,12 @@ def trend(
     from xy_sysid.fleets.trends import of_rows
     from xy_sysid.fleets.trends import trend as logic
     from xy_sysid.fleets.words import gaps, sentence, summary, widest
+    from xy_sysid.imports.reading import Reading
 
-    o.output_file("--out", out, force)
-    if not every and (names or effect_file):
-        raise BadInput("--names or --effect-file", "without --every", "with a recording", "A table has its names and effects already.")
+    o.output_file("--out", out, force, ".html")
+    if not every and (names or effect_file or reading != Reading()):
+        options = "--names, --effect-file or an option for reading a file"
+        raise BadInput(options, "without --every", "with a recording", "A table has its names, effects, axes and units already.")
     with progress() as bar:
         task = bar.add_task("comparing recordings", total=1.0)
         if every:
