@@ -360,7 +360,7 @@ def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     assert "long.npz: 1 axis, 4 recordings, 3 s." in cli("trend", path, "--every", "1s", "-o", page).out
     assert "min after the start" in page.read_text(encoding="utf-8") and "1970-01-01" not in page.read_text(encoding="utf-8")
-    assert "a time of 1 s or more" in refused("trend", path, "--every", "soon")
+    assert "a number and one of the units" in refused("trend", path, "--every", "soon")
 
 
 @pytest.mark.parametrize(("months", "words"), [(0.3, "9 d"), (0.02, "15 h"), (1e-3, "44 min"), (1e-5, "26 s"), (12.0, "12 axis-months")])
@@ -422,6 +422,22 @@ def test_an_impossible_date_in_a_yaml_file_is_told(option: str, table: Path, tmp
     path.write_text("recordings: {a.csv: {date: 2026-13-02}}", encoding="utf-8")
     command = ("trend", table, "--causes", path) if option == "--causes" else ("fleet", "--one", path, "--names", path)
     assert "own.yaml: no YAML. Correct it: month must be in 1..12" in refused(*command)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("FILE", "--every", "'10m'"), "allowed: a number and one of the units s, min, h and d"),
+        (("FILE", "--every", "1H"), "--every is '1H'; allowed: a number and one of the units s, min, h and d"),
+        (("FILE", "--every", "0.1s"), "--every is '0.1s'; allowed: a time of 1 s or more"),
+        (("FILE", "--every", "1d"), "--every is '1d'; allowed: a time that divides the recording into 4 parts or more. Choose a shorter time."),
+        (("nowhere",), "nowhere: does not exist"),
+        (("TABLE", "--axis-months", "inf"), "--axis-months is inf; allowed: a finite number"),
+    ],
+)
+def test_a_value_that_cannot_be_used_is_told_with_the_reason(words: tuple[str, ...], said: str, table: Path, tmp_path: Path) -> None:
+    """With what to change."""
+    assert said in refused("trend", *({"TABLE": table, "FILE": npz(tmp_path / "a.npz", rows=2_000)}.get(word, word) for word in words))
 
 
 @pytest.mark.parametrize("option", [("--axis", "z"), ("--map", "x.input=foo"), ("--span", "0:3"), ("--rate", "100"), ("--velocity",)])

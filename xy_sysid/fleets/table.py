@@ -94,7 +94,8 @@ def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
         raise BadRecording(folder, "not a table of a fleet", act)
     files = _files(folder)
     if not files:
-        raise BadRecording(folder, "no Parquet files in it", "Make the table first: xy-sysid fleet PATH -o TABLE.")
+        problem = "no Parquet files in it" if folder.exists() else "does not exist"
+        raise BadRecording(folder, problem, "Make the table first: xy-sysid fleet PATH -o TABLE.")
     parts = [_of_file(file) for file in files]
     try:
         found = pa.concat_tables(parts, promote_options="default")
