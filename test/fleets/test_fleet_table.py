@@ -65,6 +65,12 @@ def test_a_recording_that_was_moved_and_done_by_another_version_is_no_second_one
     assert table(tmp_path, "source") == [("new/a.npz",), ("new/b.npz",)]
 
 
+def test_a_copy_in_the_same_run_is_no_second_recording(tmp_path: Path) -> None:
+    """Their keys differ if the effects of one are tried first in the other. Another date makes another recording."""
+    merged(tmp_path, [row("a.npz", file_sha256="same"), row("copy.npz", file_sha256="same"), row("later.npz", file_sha256="same", date=None)])
+    assert table(tmp_path, "source") == [("later.npz",), ("copy.npz",)]
+
+
 def test_one_file_under_the_names_of_two_axes_is_two_recordings(tmp_path: Path) -> None:
     """In any order of arrival."""
     merged(tmp_path, [row("x.npz", file_sha256="same")])

@@ -200,9 +200,9 @@ def _with(table: pyarrow.Table, whole: pyarrow.Schema) -> pyarrow.Table:
     return pa.Table.from_arrays(arrays, schema=whole)
 
 
-def _each_once(rows: Sequence[Row]) -> list[Row]:
-    """The last of all rows of the same axis of the same recording, which may be stored in two places."""
-    return list({(row["key"] or row["source"], row["axis"]): row for row in rows}.values())
+def _each_once(rows: Iterable[Row]) -> list[Row]:
+    """The last of all rows of the same axis, date and content, which may be stored in two places."""
+    return list({(row.get("file_sha256") or row["source"], row.get("date"), row["axis"]): row for row in rows}.values())
 
 
 def file_name(machine: str) -> str:
