@@ -43,12 +43,12 @@ class Causes(Settings):
         return max(fitting, key=lambda one: (sum(_explains(one, move) for move in seen), len(one.when)), default=None)
 
 
-def causes(own: Path | None = None) -> Causes:
+def causes(own: Path | str | None = None) -> Causes:
     """The package's table, preceded by the quantities and causes of a user's file. Raises BadRecording or BadInput."""
     ours = _read(OURS)
     if own is None:
         return ours
-    theirs = _read(own)
+    theirs = _read(Path(own))
     quantities = {**theirs.quantities, **ours.quantities, **theirs.quantities}  # the user's patterns are tried first and take precedence
     both = Causes(quantities=quantities, causes=[*theirs.causes, *ours.causes])
     for number, one in enumerate(theirs.causes, 1):
