@@ -9,7 +9,7 @@ import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator, model_validator
 
@@ -19,6 +19,7 @@ from xy_sysid.units import Units
 Names = Annotated[list[str], BeforeValidator(lambda value: value.split(",") if isinstance(value, str) else value)]
 CHOICE = re.compile(r"'([^']*)'")
 SIGNS = {"ge": ">= ", "gt": "> ", "le": "<= ", "lt": "< ", "expected": ""}  # how a limit that was broken is told
+KINDS = {"list_type": "a list", "string_type": "text", "dict_type": "names with values", "model_type": "names with values"}  # of values in YAML
 AnySettings = TypeVar("AnySettings", bound="Settings")
 
 
@@ -476,14 +477,23 @@ def unknown_name(name: str, known: Mapping[str, Any] | list[str], where: str) ->
     return BadInput(f"{where}: name", repr(name), ", ".join(known), act)
 
 
+def _owner(cls: type[Settings], place: Iterable[int | str]) -> type[Settings]:
+    """The class of the settings at a place within nested ones."""
+    for part in place:
+        info = cls.model_fields.get(str(part))
+        inner = [one for one in get_args(info.annotation) if isinstance(one, type) and issubclass(one, Settings)] if info else []
+        cls = inner[0] if inner else cls
+    return cls
+
+
 def _explain(cls: type[Settings], error: ValidationError, where: str) -> BadInput:
     first = error.errors()[0]
     name = ".".join(str(part) for part in first["loc"])
     if first["type"] == "extra_forbidden":
-        owner: type[Settings] = AxisExcitation if len(first["loc"]) > 1 else cls
-        return unknown_name(str(first["loc"][-1]), list(owner.model_fields), where)
+        return unknown_name(str(first["loc"][-1]), list(_owner(cls, first["loc"][:-1]).model_fields), where)
     context = first.get("ctx", {})
-    allowed = ", ".join(f"{SIGNS[key]}{value}" for key, value in context.items() if key in SIGNS) or first["msg"].removeprefix("Input should be ")
+    limits = ", ".join(f"{SIGNS[key]}{value}" for key, value in context.items() if key in SIGNS)
+    allowed = limits or KINDS.get(first["type"], first["msg"].removeprefix("Input should be "))
     if "error" in context:
         return BadInput(f"{where}", name or "not consistent", str(context["error"]), "Change one of them.")
     near = difflib.get_close_matches(str(first["input"]), CHOICE.findall(allowed), n=1) if first["type"] == "literal_error" else []

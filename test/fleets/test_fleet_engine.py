@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -209,6 +210,31 @@ def waited(happened: Any) -> None:
     """Wait for an event by polling, up to the time limit of the test."""
     while not happened():
         time.sleep(0.02)
+
+
+SCHEDULER = """
+import time
+from distributed import LocalCluster
+with LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
+    print(cluster.scheduler_address, flush=True)
+    time.sleep(600.0)
+"""
+
+
+def test_a_scheduler_without_workers_and_one_that_goes_away_are_told(data: Path, tmp_path: Path) -> None:
+    """The command says that it waits; when the scheduler is killed, one line and no traceback."""
+    with ExitStack() as stack:
+        scheduler = stack.enter_context(subprocess.Popen([sys.executable, "-c", SCHEDULER], env=bare(), stdout=subprocess.PIPE, text=True))
+        stack.callback(scheduler.kill)
+        assert scheduler.stdout is not None
+        arguments = [*COMMAND, "fleet", str(data), "-o", str(tmp_path / "t"), "--scheduler", scheduler.stdout.readline().strip()]
+        command = stack.enter_context(subprocess.Popen(arguments, env=bare(), stderr=subprocess.PIPE, text=True))
+        stack.callback(command.kill)
+        assert command.stderr is not None
+        assert "waiting for workers of the scheduler" in command.stderr.readline()
+        scheduler.kill()
+        lost = "xy-sysid: The connection to the scheduler is lost. Finished recordings are in the table: run the same command again.\n"
+        assert (command.communicate()[1], command.returncode) == (lost, 2)
 
 
 def test_only_one_run_writes_a_table(tmp_path: Path, data: Path) -> None:

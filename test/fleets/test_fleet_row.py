@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from helpers.simulated import recorded
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.errors import BadInput
 from xy_sysid.fleets.columns import TIMES, columns
-from xy_sysid.fleets.naming import Name, Named, Names, name_of, names_from
+from xy_sysid.fleets.naming import Name, Named, Names, name_of, names_from, unused
 from xy_sysid.fleets.of_file import Task, rows_of_file
 from xy_sysid.fleets.row import Plan, Row, row_of
 from xy_sysid.samples.recording import Recording, Run
@@ -71,7 +72,16 @@ def test_what_cannot_be_read_is_a_row_that_says_why(tmp_path: Path) -> None:
     assert row["machine"] == "mill-07" and row["date"] == datetime(2026, 3, 3, tzinfo=UTC)
     assert row["stage"] == "reading" and row["problem"].startswith("no voltage column")
     (row,) = rows_of_file(Task(str(tmp_path / "gone.csv"))).rows
-    assert row["problem"].startswith("cannot be read (No such file or directory)")
+    assert row["problem"].startswith("cannot be read (No such file or directory)") and row["date"] is None
+
+
+def test_a_dead_link_or_a_pipe_keeps_the_machine_and_date_of_its_path(tmp_path: Path) -> None:
+    """So trend can say that the newest recording of a machine cannot be read."""
+    (tmp_path / "m7_2026-03-01.csv").symlink_to("nowhere")
+    os.mkfifo(tmp_path / "m7_2026-03-02.csv")
+    names = Names(pattern="{machine}_{date}.csv")
+    rows = [row for path in sorted(tmp_path.iterdir()) for row in rows_of_file(Task(str(path), names)).rows]
+    assert [(row["machine"], row["stage"], row["date"].day) for row in rows] == [("m7", "reading", 1), ("m7", "reading", 2)]
 
 
 def test_an_axis_that_cannot_be_fitted_keeps_what_is_known_of_it() -> None:
@@ -113,6 +123,15 @@ def test_an_error_that_nobody_thought_of_in_one_axis_leaves_the_others_theirs(tm
         ("/data/mill-07/2026-03-03T14-30-05+0200.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 12, 30, 5, tzinfo=UTC))),
         ("/data/mill-07/2026-03-03T14:30:05-05:00.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 19, 30, 5, tzinfo=UTC))),
         ("/data/mill-07/2026-03-03-14:30.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 14, 30, tzinfo=UTC))),
+        ("/data/mill-07/2026-03-03T143005-0500.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 19, 30, 5, tzinfo=UTC))),
+        ("/data/mill-07/2026-03-03T14-30-0330.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 18, 0, tzinfo=UTC))),
+        ("/data/mill-07/20260303T143005+02.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 12, 30, 5, tzinfo=UTC))),
+        ("/data/mill-07/2026-03-03T14-30-05+05-30.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 9, 0, 5, tzinfo=UTC))),
+        ("/data/mill-07/2026-03-03_143005-0012.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 14, 30, 5, tzinfo=UTC))),
+        ("/data/mill-07/SN20440101_2026-03-03.csv", "", Name("mill-07", "", datetime(2026, 3, 3, tzinfo=UTC))),
+        ("/data/mill-07/SN20440101_20260303_143005.csv", "", Name("mill-07", "", datetime(2026, 3, 3, 14, 30, 5, tzinfo=UTC))),
+        ("/data/mill-07/2026_03_03_SN20440101.csv", "", Name("mill-07", "", datetime(2026, 3, 3, tzinfo=UTC))),
+        ("/data/mill-07/rec20260303.csv", "", Name("mill-07", "", datetime(2026, 3, 3, tzinfo=UTC))),
         (
             "/data/mill-07/z/20260303T1430_a.csv",
             "{machine}/{axis}/{date}*",
@@ -141,11 +160,40 @@ def test_a_small_file_names_what_the_path_does_not_tell(tmp_path: Path) -> None:
         name_of(Path("/x/old/b.csv"), names)
 
 
-@pytest.mark.parametrize("pattern", ["{machin}/*", "{machine}/{machine}"])
+@pytest.mark.parametrize(
+    ("entry", "words"),
+    [
+        ("{machin: a}", "allowed: machine, axis, date. Did you mean 'machine'?"),
+        ("{machine: , date: 2026-01-02}", "machine is None; allowed: text."),
+        ("{axis: }", "axis is None; allowed: text."),
+        ("text", "recordings.a.csv is 'text'; allowed: names with values."),
+        ("{machine: m7, date: 1926-03-03}", "date of a.csv is '1926-03-03'; allowed: a year from 2000 to 2099."),
+        ("{machine: m7, date: May}", "date of a.csv is 'May'; allowed: a day and a time of day."),
+    ],
+)
+def test_a_mistake_in_a_file_of_names_is_told_before_any_work(entry: str, words: str, tmp_path: Path) -> None:
+    file = tmp_path / "names.yaml"
+    file.write_text(f"recordings: {{a.csv: {entry}}}", encoding="utf-8")
+    assert words in refused("fleet", npz(tmp_path / "a.npz", rows=100), "-o", tmp_path / "table", "--names", file)
+
+
+def test_an_entry_that_names_no_recording_is_found() -> None:
+    """An end of a path begins with the whole name of a folder or file."""
+    names = Names(recordings={end: Named(machine="m") for end in ("/x/old/a.csv", "old/a.csv", "a.csv", "ld/a.csv")})
+    assert unused(names, [Path("/x/old/a.csv")]) == ("ld/a.csv",)
+
+
+@pytest.mark.parametrize("pattern", ["{machin}/*", "{machine}/{machine}", "{ machine }/*", "/{machine}/*", "./*.npz", "{machine}/"])
 def test_a_pattern_that_means_nothing_is_refused(pattern: str, tmp_path: Path) -> None:
     """In one line, before any work."""
     npz(tmp_path / "a.npz", rows=100)
     assert "pattern is" in refused("fleet", tmp_path, "-o", tmp_path / "table", "--pattern", pattern)
+
+
+def test_one_recording_that_does_not_exist_is_a_mistake(tmp_path: Path) -> None:
+    """A misspelt path in cron is an error; a file that exists and cannot be read is a row."""
+    assert "--one is nothere.csv; allowed: a recording that exists" in refused("fleet", "--one", "nothere.csv", "-o", tmp_path / "row.parquet")
+    assert not (tmp_path / "row.parquet").exists()
 
 
 def test_one_recording_is_a_document_or_a_file(tmp_path: Path) -> None:

@@ -65,6 +65,12 @@ def test_a_recording_that_was_moved_and_done_by_another_version_is_no_second_one
     assert table(tmp_path, "source") == [("new/a.npz",), ("new/b.npz",)]
 
 
+def test_a_copy_in_the_same_run_is_no_second_recording(tmp_path: Path) -> None:
+    """Their keys differ if the effects of one are tried first in the other. Another date makes another recording."""
+    merged(tmp_path, [row("a.npz", file_sha256="same"), row("copy.npz", file_sha256="same"), row("later.npz", file_sha256="same", date=None)])
+    assert table(tmp_path, "source") == [("later.npz",), ("copy.npz",)]
+
+
 def test_one_file_under_the_names_of_two_axes_is_two_recordings(tmp_path: Path) -> None:
     """In any order of arrival."""
     merged(tmp_path, [row("x.npz", file_sha256="same")])
@@ -83,8 +89,25 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
     merged(tmp_path, [row("a.npz"), row("b.npz", machine="mill-02")])
     (tmp_path / "mill-02.parquet").write_bytes(b"PAR1 rubbish")
     for act in (lambda: read(tmp_path), lambda: merged(tmp_path, [row("c.npz", machine="mill-02")])):
-        with pytest.raises(BadRecording, match=r"mill-02\.parquet: cannot be read as Parquet .* Remove it"):
+        with pytest.raises(BadRecording, match=r"mill-02\.parquet: cannot be read as Parquet .* move it away and run xy-sysid fleet again"):
             act()
+
+
+@pytest.mark.parametrize("name", ["m" * 250, "\u65e5" * 90, "mill\udcff", "." * 250, "a/b"])
+def test_any_name_of_a_machine_has_a_file(name: str, tmp_path: Path) -> None:
+    """A long name, one in another script, and a folder's name that is not UTF-8; names with the same beginning have different files."""
+    merged(tmp_path, [row("a.npz", machine=name), row("b.npz", machine=f"{name}2"), row("c.npz")])
+    merged(tmp_path, [row("a.npz", machine=name)])
+    assert sorted(table(tmp_path, "source")) == [("a.npz",), ("b.npz",), ("c.npz",)]
+    assert len(list(tmp_path.glob("*.parquet"))) == 3
+
+
+def test_a_damaged_file_of_a_machine_does_not_keep_the_others_out_of_the_table(tmp_path: Path) -> None:
+    """Machines before and after it in the alphabet have their rows, and the error names the file."""
+    (tmp_path / "mill-02.parquet").write_bytes(b"PAR1 rubbish")
+    with pytest.raises(BadRecording, match=r"mill-02\.parquet"):
+        merged(tmp_path, [row(f"{number}.npz", machine=f"mill-0{number}") for number in (1, 2, 3)])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mill-01.parquet", "mill-02.parquet", "mill-03.parquet"]
 
 
 def test_a_recording_is_found_once_and_any_process_finds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,6 +119,14 @@ def test_a_recording_is_found_once_and_any_process_finds_it(tmp_path: Path, monk
     assert found == tmp_path / "data" / "a.npz"
     task = Analysis(effect_files=("own.py",)).task(Path("data/a.npz"))
     assert task.path == os.fspath(found) and task.effect_files == (os.fspath(tmp_path / "own.py"),)
+
+
+def test_the_folder_of_the_recordings_is_not_that_of_the_table(tmp_path: Path) -> None:
+    """The error names -o, not missing recordings; the table's folder among others is passed over."""
+    npz(tmp_path / "a.npz", rows=300)
+    assert f"-o is {tmp_path}; allowed: another folder than that of the recordings" in refused("fleet", tmp_path, "-o", tmp_path)
+    (tmp_path / "table").mkdir()
+    assert recordings([tmp_path / "a.npz", tmp_path / "table"], tmp_path / "table") == (tmp_path / "a.npz",)
 
 
 def test_a_recording_that_names_its_machine_is_of_that_machine(tmp_path: Path) -> None:

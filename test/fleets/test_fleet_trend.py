@@ -23,6 +23,7 @@ from xy_sysid.fleets.causes import causes
 from xy_sysid.fleets.change import changes, evidence, statistic
 from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
+from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import merged
 from xy_sysid.fleets.trends import of_axes, of_rows
 from xy_sysid.fleets.wander import Series, usual
@@ -281,13 +282,29 @@ def test_users_add_causes_of_their_own(tmp_path: Path) -> None:
         causes(own)
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("causes: [{cause: hose, wenn: [gain down]}]", "allowed: cause, when, also, check. Did you mean 'when'?"),
+        ("causes: [{when: [gain down]}]", "cause 1 is without a name"),
+        ("", "causes is None; allowed: a list."),
+    ],
+)
+def test_a_mistake_in_a_file_of_causes_is_told_with_what_is_allowed_there(text: str, words: str, tmp_path: Path) -> None:
+    own = tmp_path / "causes.yaml"
+    own.write_text(text, encoding="utf-8")
+    with pytest.raises(BadInput, match=re.escape(words)):
+        causes(own)
+
+
 def test_a_quantity_of_a_user_comes_before_those_of_the_package(tmp_path: Path) -> None:
     """A column in both files measures the quantity of the user's file."""
     own = tmp_path / "causes.yaml"
     text = "quantities: {rail drag: [coulomb_friction_coulomb]}\ncauses:\n  - {cause: a dry rail, when: [rail drag up]}\n"
     own.write_text(text, encoding="utf-8")
-    found = causes(own).likeliest([("coulomb_friction_coulomb", "up")])
-    assert found is not None and found.cause == "a dry rail"
+    for path in (own, str(own)):
+        found = causes(path).likeliest([("coulomb_friction_coulomb", "up")])
+        assert found is not None and found.cause == "a dry rail"
 
 
 def test_causes_are_read_before_the_long_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -344,7 +361,7 @@ def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     assert "long.npz: 1 axis, 4 recordings, 3 s." in cli("trend", path, "--every", "1s", "-o", page).out
     assert "min after the start" in page.read_text(encoding="utf-8") and "1970-01-01" not in page.read_text(encoding="utf-8")
-    assert "a time of 1 s or more" in refused("trend", path, "--every", "soon")
+    assert "a number and one of the units" in refused("trend", path, "--every", "soon")
 
 
 @pytest.mark.parametrize(("months", "words"), [(0.3, "9 d"), (0.02, "15 h"), (1e-3, "44 min"), (1e-5, "26 s"), (12.0, "12 axis-months")])
@@ -373,6 +390,81 @@ def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:
     with pytest.raises(BadInput, match="4 rows, 1 of which could not be read; allowed: an axis with 4 of them"):
         of_rows([unread("mill-00", 3), *(recorded("mill-00", k, 0.1) for k in range(3))])
     assert "machine is mill-99; allowed: one of mill-00, mill-01, mill-02." in refused("trend", table, "--machine", "mill-99")
+
+
+@pytest.mark.parametrize("name", ["long.csv", "page.html", "long.parquet"])
+def test_a_recording_in_place_of_a_table_is_never_to_be_removed(name: str, tmp_path: Path) -> None:
+    """--every is missing; a file that is not a table's is named as such."""
+    path = tmp_path / name
+    path.write_text("t,u,y\n", encoding="utf-8")
+    said = refused("trend", path)
+    assert "Remove" not in said
+    assert "add --every 10min" in said or name.endswith(".parquet")
+
+
+@pytest.mark.parametrize("changes", [{"date": "1 May"}, {"gain": "much"}])
+def test_a_table_with_text_in_place_of_dates_or_numbers_is_refused(changes: Row, tmp_path: Path) -> None:
+    """In one line; numbers and dates that another program wrote in another precision are read."""
+    import pyarrow
+    import pyarrow.parquet
+
+    rows = [recorded("mill-00", k, 0.1) for k in range(5)]
+    other = pyarrow.Table.from_pylist(rows).drop_columns("gain_low").append_column("gain_low", pyarrow.array([0.09] * 5, pyarrow.float32()))
+    pyarrow.parquet.write_table(other, tmp_path / "good.parquet")
+    assert len(xy.trend(tmp_path).axes[0].dates) == 5
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist([row | changes for row in rows]), tmp_path / "good.parquet")
+    assert "a column of another kind" in refused("trend", tmp_path)
+
+
+@pytest.mark.parametrize("option", ["--causes", "--names"])
+def test_an_impossible_date_in_a_yaml_file_is_told(option: str, table: Path, tmp_path: Path) -> None:
+    """YAML reads 2026-13-02 as a date."""
+    path = tmp_path / "own.yaml"
+    path.write_text("recordings: {a.csv: {date: 2026-13-02}}", encoding="utf-8")
+    command = ("trend", table, "--causes", path) if option == "--causes" else ("fleet", "--one", path, "--names", path)
+    assert "own.yaml: no YAML. Correct it: month must be in 1..12" in refused(*command)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("FILE", "--every", "'10m'"), "allowed: a number and one of the units s, min, h and d"),
+        (("FILE", "--every", "1H"), "--every is '1H'; allowed: a number and one of the units s, min, h and d"),
+        (("FILE", "--every", "0.1s"), "--every is '0.1s'; allowed: a time of 1 s or more"),
+        (("FILE", "--every", "1d"), "--every is '1d'; allowed: a time that divides the recording into 4 parts or more. Choose a shorter time."),
+        (("nowhere",), "nowhere: does not exist"),
+        (("TABLE", "--axis-months", "inf"), "--axis-months is inf; allowed: a finite number"),
+    ],
+)
+def test_a_value_that_cannot_be_used_is_told_with_the_reason(words: tuple[str, ...], said: str, table: Path, tmp_path: Path) -> None:
+    """With what to change."""
+    assert said in refused("trend", *({"TABLE": table, "FILE": npz(tmp_path / "a.npz", rows=2_000)}.get(word, word) for word in words))
+
+
+@pytest.mark.parametrize("option", [("--axis", "z"), ("--map", "x.input=foo"), ("--span", "0:3"), ("--rate", "100"), ("--velocity",)])
+def test_options_for_a_recording_are_refused_for_a_table(option: tuple[str, ...], table: Path) -> None:
+    """They would change nothing."""
+    assert "without --every" in refused("trend", table, *option)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("trend", "TABLE", "-o", "page.txt"), "page.txt; allowed: a name that ends with .html"),
+        (("fleet", "--one", "FILE", "-o", "row.csv"), "row.csv; allowed: a name that ends with .parquet"),
+        (("fleet", "--one", "FILE", "FILE"), "given with --one"),
+        (("fleet", "--one", "FILE", "--workers", "3"), "given with --one"),
+        (("fleet", "--one", "FILE", "--scheduler", "tcp://here:1"), "given with --one"),
+        (("fleet", "FILE", "-o", "table", "--force"), "--force is given without --one"),
+    ],
+)
+def test_an_option_without_an_effect_is_refused(
+    words: tuple[str, ...], said: str, table: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before any work."""
+    monkeypatch.chdir(tmp_path)
+    path = npz(tmp_path / "a.npz", rows=300)
+    assert said in refused(*({"TABLE": table, "FILE": path}.get(word, word) for word in words))
 
 
 def test_one_machine_has_the_trend_that_it_has_among_all(table: Path) -> None:

@@ -50,7 +50,7 @@ def yaml_of(path: Path, what: str, most: int = LONGEST) -> Any:
     try:
         problem = too_much(text)
         document = None if problem else yaml.safe_load(text)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: an impossible date
         raise BadRecording(path, "no YAML", f"Correct it: {str(error).splitlines()[-1].strip()}.") from None
     if problem:
         raise BadRecording(path, f"it holds {problem}, and {what} has fewer", "Check the path.")

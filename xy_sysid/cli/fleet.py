@@ -65,8 +65,14 @@ def fleet(
     said = said.model_copy(update={"pattern": pattern or said.pattern, "follow": [*said.follow, *(follow or [])]})
     how = Analysis(names=said, reading=reading, effect_files=tuple(map(str, effect_file or ())))
     if one is not None:
+        if paths or workers or scheduler:
+            raise BadInput("PATH, --workers or --scheduler", "given with --one", "one recording in this process", "Leave out one of them.")
+        if not one.exists():
+            raise BadInput("--one", str(one), "a recording that exists", "Check the path.")
         _one(one, out, how, force)
         return
+    if force:
+        raise BadInput("--force", "given without --one", "with --one", "Leave it out: a table is updated, not replaced.")
     if not paths or out is None:
         raise BadInput("PATH and -o", "not both given", "recordings or folders, and the table's folder", "Write: xy-sysid fleet PATH... -o TABLE.")
     if out.is_file():
@@ -79,7 +85,8 @@ def fleet(
             bar.update(task, description=now.sentence(), total=now.total, completed=now.done)
             if now.done == 0 and now.place:
                 many, on = "" if now.total == 1 else "s", "" if now.workers == 1 else "es"
-                aside.print(f"{now.total} recording{many} on {now.workers} process{on}; dashboard: {now.place}")
+                where = f" on {now.workers} process{on}" if now.workers else ", waiting for workers of the scheduler"
+                aside.print(f"{now.total} recording{many}{where}; dashboard: {now.place}")
             elif bar.disable and time.perf_counter() - last[0] > EVERY:
                 last[0] = time.perf_counter()
                 aside.print(now.sentence())
@@ -92,6 +99,8 @@ def fleet(
     say(f"{out}: {now.sentence()}.")
     if now.failed:
         say("  The columns problem and stage say why there is no answer.")
+    if now.unused:
+        say(f"  Entries of {names} that fit no recording: {', '.join(now.unused)}.")
 
 
 def _one(path: Path, out: Path | None, how: Analysis, force: bool) -> None:
@@ -108,7 +117,7 @@ def _one(path: Path, out: Path | None, how: Analysis, force: bool) -> None:
         ]
         emit({"rows": rows})
         return
-    o.output_file("--out", out, force)
+    o.output_file("--out", out, force, ".parquet")
     table = one(path, how)
     write(table, out)
     say(f"{out}: {table.num_rows} row{'s' if table.num_rows != 1 else ''} of {path}.")

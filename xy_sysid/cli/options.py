@@ -97,10 +97,12 @@ def ros_domain() -> None:
         raise BadInput("ROS_DOMAIN_ID", repr(text), f"0 to {LARGEST_DOMAIN}", "Set it, or leave it unset for 0.")
 
 
-def output_file(option: str, path: Path | None, force: bool) -> None:
-    """Raises BadInput, before any work, if a file cannot be written, or would replace one without --force."""
+def output_file(option: str, path: Path | None, force: bool, ending: str = "") -> None:
+    """Raises BadInput, before any work, if a file cannot be written, would replace one without --force, or has another ending than this one."""
     if path is None:
         return
+    if ending and path.suffix.lower() not in ("", ending):
+        raise BadInput(option, str(path), f"a name that ends with {ending}", "Change the ending.")
     from xy_sysid.files.unasked import free
 
     folder = path.absolute().parent

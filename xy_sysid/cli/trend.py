@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -43,22 +45,29 @@ def trend(
     """Find changes of every parameter of every axis over time: since when, by how much, how certain, and the likely cause."""
     from xy_sysid.errors import BadInput
     from xy_sysid.fleets.causes import causes as causes_of
+    from xy_sysid.fleets.history import FEWEST
     from xy_sysid.fleets.naming import Names, names_from
     from xy_sysid.fleets.of_paths import Analysis
     from xy_sysid.fleets.parts import rows_of_parts, seconds
     from xy_sysid.fleets.trends import of_rows
     from xy_sysid.fleets.trends import trend as logic
     from xy_sysid.fleets.words import gaps, sentence, summary, widest
+    from xy_sysid.imports.reading import Reading
 
-    o.output_file("--out", out, force)
-    if not every and (names or effect_file):
-        raise BadInput("--names or --effect-file", "without --every", "with a recording", "A table has its names and effects already.")
+    o.output_file("--out", out, force, ".html")
+    if not every and (names or effect_file or reading != Reading()):
+        options = "--names, --effect-file or an option for reading a file"
+        raise BadInput(options, "without --every", "with a recording", "A table has its names, effects, axes and units already.")
+    if not math.isfinite(axis_months):
+        raise BadInput("--axis-months", axis_months, "a finite number", "Leave it out, or write for example 1000.")
     with progress() as bar:
         task = bar.add_task("comparing recordings", total=1.0)
         if every:
             known = causes_of(causes)
             how = Analysis(names_from(names) if names is not None else Names(), reading, tuple(map(str, effect_file or ())))
             parts = rows_of_parts(folder, seconds(every), how, lambda number: bar.update(task, description=f"part {number}"))
+            if max(Counter(row["axis"] for row in parts).values(), default=0) < FEWEST:
+                raise BadInput("--every", repr(every), f"a time that divides the recording into {FEWEST} parts or more", "Choose a shorter time.")
             found = of_rows(parts, {name for row in parts for name in row}, known, axis_months, machines=machine or ())
         else:
             found = logic(

@@ -43,15 +43,17 @@ class Causes(Settings):
         return max(fitting, key=lambda one: (sum(_explains(one, move) for move in seen), len(one.when)), default=None)
 
 
-def causes(own: Path | None = None) -> Causes:
+def causes(own: Path | str | None = None) -> Causes:
     """The package's table, preceded by the quantities and causes of a user's file. Raises BadRecording or BadInput."""
     ours = _read(OURS)
     if own is None:
         return ours
-    theirs = _read(own)
+    theirs = _read(Path(own))
     quantities = {**theirs.quantities, **ours.quantities, **theirs.quantities}  # the user's patterns are tried first and take precedence
     both = Causes(quantities=quantities, causes=[*theirs.causes, *ours.causes])
-    for one in theirs.causes:
+    for number, one in enumerate(theirs.causes, 1):
+        if not one.cause:
+            raise BadInput(f"{own}: cause {number}", "without a name", "one with a name", "Write what may have happened: cause: a worn nut.")
         if not one.when:
             raise BadInput(f"{own}: when of {one.cause!r}", "empty", "one change or more", "Write the change that points to it, such as gain down.")
         for change in (*one.when, *one.also):

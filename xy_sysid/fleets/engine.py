@@ -8,11 +8,12 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from xy_sysid.errors import BadInput, MissingExtra
+from xy_sysid.errors import BadInput, MissingExtra, XySysidError
 from xy_sysid.fleets.of_file import Done, Task, lost, rows_of_file
 from xy_sysid.fleets.row import FAULT
 from xy_sysid.jit import cores
@@ -61,7 +62,7 @@ def connected(where: Cluster) -> Iterator[Client]:
             client = distributed.Client(where.scheduler, timeout=PATIENCE)
         except (OSError, ValueError) as error:
             raise BadInput("--scheduler", where.scheduler, "the address of a dask scheduler, tcp://HOST:PORT", f"Start one ({error}).") from None
-        with client:
+        with distributed.utils.silence_logging_cmgr("CRITICAL"), client:
             yield client
         return
     import dask as settings
@@ -89,17 +90,23 @@ def _own_environment() -> Iterator[None]:
 
 
 def processes(client: Client) -> int:
-    """Threads of all workers of a cluster: tasks that run at the same time."""
+    """Threads of all workers of a cluster: tasks that run at the same time; 0 for a scheduler without workers."""
     workers: dict[str, dict[str, int]] = client.scheduler_info(n_workers=-1)["workers"]
-    return max(sum(one["nthreads"] for one in workers.values()), 1)
+    return sum(one["nthreads"] for one in workers.values())
 
 
 def results(client: Client, tasks: Sequence[Task]) -> Iterator[tuple[Done, float]]:
-    """(result, duration in s) of each task in order of completion; only a few tasks wait at the scheduler at a time."""
+    """(result, duration in s) of each task in order of completion; only a few tasks wait at the scheduler at a time.
+
+    Raises XySysidError if the scheduler goes away.
+    """
     waiting, doubtful = iter(tasks), list[Task]()
-    yield from _window(client, waiting, lambda: AHEAD * processes(client), doubtful)
     blamed = list[Task]()
-    yield from _window(client, iter(doubtful), lambda: 1, blamed)
+    try:
+        yield from _window(client, waiting, lambda: AHEAD * max(processes(client), 1), doubtful)
+        yield from _window(client, iter(doubtful), lambda: 1, blamed)
+    except (CancelledError, OSError):
+        raise XySysidError("The connection to the scheduler is lost. Finished recordings are in the table: run the same command again.") from None
     for task in blamed:
         yield lost(task, DIED), 0.0
 

@@ -15,6 +15,7 @@ class Progress:
     done, total: recordings, including ``unchanged`` ones, which are already in the table, and ``failed`` ones, whose rows have no answer
     elapsed: s since the first recording started; spent, square: sum of the durations of the done ones, s, and of their squares
     workers: processes at work; place: address of the dashboard, if there is one
+    unused: entries in the file of names that fit none of the recordings
     """
 
     total: int
@@ -26,6 +27,7 @@ class Progress:
     square: float = 0.0
     workers: int = 1
     place: str = ""
+    unused: tuple[str, ...] = ()
 
     @property
     def analysed(self) -> int:

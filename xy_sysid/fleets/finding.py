@@ -21,13 +21,15 @@ def recordings(paths: Iterable[Path | str], besides: Path | None = None) -> tupl
     Raises BadInput for a path that does not exist, or if there is no recording.
     """
     found: dict[Path, None] = {}
-    given = [Path(path).absolute() for path in paths]
+    given, besides = [Path(path).absolute() for path in paths], besides.absolute() if besides is not None else None
     for path in given:
         matches = [path] if path.exists() else _matching(path)
         if not matches:
             raise BadInput("recordings", str(path), "a recording, a folder with recordings, or a pattern that matches some", "Check the path.")
         for match in matches:
-            found |= dict.fromkeys(_below(match, besides.absolute() if besides is not None else None))
+            found |= dict.fromkeys(_below(match, besides))
+    if not found and besides in given:
+        raise BadInput("-o", str(besides), "another folder than that of the recordings", "Write for example: -o table.")
     if not found:
         raise BadInput("recordings", f"none in {', '.join(map(str, given))}", f"bags, or files that end with {', '.join(ENDINGS)}", "Check the path.")
     return tuple(sorted(found))

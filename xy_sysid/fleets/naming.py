@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -14,7 +15,7 @@ from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import Settings, build, knob
 
-ZONE = r"(?:Z|[+-]\d\d:\d\d|\+\d{4})"
+ZONE = r"(?:Z|[+-]\d\d:\d\d|\+\d\d(?:-?\d\d)?|-(?:0[1-9]|1[0-2])(?:00|30))"  # others after a minus are numbers of runs
 DATE = rf"(?<!\d)\d{{4}}[-_.]?\d\d[-_.]?\d\d(?:[T_ -]?\d\d[-_:]?\d\d(?:[-_:]?\d\d)?{ZONE}?)?(?!\d)"
 PARTS = {"{machine}": r"(?P<machine>[^/]+?)", "{axis}": r"(?P<axis>[^/]+?)", "{date}": f"(?P<date>{DATE})", "*": "[^/]*"}
 FIRST, LAST = datetime(2000, 1, 1, tzinfo=UTC), datetime(2100, 1, 1, tzinfo=UTC)  # dates outside count from another start
@@ -68,8 +69,32 @@ def names_from(path: Path) -> Names:
 
 
 def _dated(value: Any) -> Any:
-    """The value as text: YAML converts 2026-03-03 to a date."""
-    return {key: one if isinstance(one, str) else str(one) for key, one in value.items()} if isinstance(value, dict) else value
+    """The value as text: YAML converts 2026-03-03 to a date. An empty value stays empty, which is refused."""
+    return {key: one if one is None else str(one) for key, one in value.items()} if isinstance(value, dict) else value
+
+
+def check(names: Names) -> None:
+    """Raises BadInput for an invalid pattern, or an invalid date of a recording."""
+    if names.pattern:
+        compiled(names.pattern)
+    for end, one in names.recordings.items():
+        _said_date(one.date, f"date of {end}")
+
+
+def fits(names: Names, paths: Sequence[Path]) -> None:
+    """Raises BadInput if the pattern fits none of the recordings, and ``recordings`` names none of them."""
+    if names.pattern and paths and set(unused(names, paths)) == {*names.recordings}:
+        pattern = compiled(names.pattern)
+        if not any(pattern.search(path.absolute().as_posix()) for path in paths):
+            allowed = f"one that fits the end of the path of a recording, for example of {paths[0]}"
+            raise BadInput("pattern", repr(names.pattern), allowed, f"Write for example {EXAMPLE}.")
+
+
+def unused(names: Names, paths: Iterable[Path]) -> tuple[str, ...]:
+    """The entries of ``recordings`` that name none of these recordings."""
+    whole = [path.absolute().as_posix() for path in paths]
+    ends = {place[found.start() :].removeprefix("/") for place in whole for found in re.finditer("/", place)} | {*whole}
+    return tuple(end for end in names.recordings if end not in ends)
 
 
 def name_of(path: Path, names: Names) -> Name:
@@ -96,17 +121,18 @@ def name_of(path: Path, names: Names) -> Name:
     return Name(machine or path.absolute().parent.name, axis, date, said=bool(machine))
 
 
-def _said_date(text: str) -> datetime | None:
-    """The date in a text that a user gave as a date; None for an empty text. Raises BadInput."""
-    found = date_of(text) if text else None
+def _said_date(text: str, what: str = "date") -> datetime | None:
+    """The date in a text that a user gave as a date; None for an empty text. Raises BadInput, which says ``what`` it is."""
+    found = date_of(text, what) if text else None
     if found is not None and not FIRST <= found < LAST:
-        raise BadInput("date", repr(text), f"a year from {FIRST.year} to {LAST.year - 1}", "Correct it, or leave it out.")
+        raise BadInput(what, repr(text), f"a year from {FIRST.year} to {LAST.year - 1}", "Correct it, or leave it out.")
     return found
 
 
 def _date_in(name: str) -> datetime | None:
-    """The first date in the name of a file; None if it has none."""
-    for found in re.finditer(f"(?=({DATE}))", name):
+    """The first date in the name of a file; None if it has none. One with separators comes first, and one after a letter, like SN20440101, last."""
+    dates = re.finditer(f"(?=({DATE}))", name)
+    for found in sorted(dates, key=lambda one: (one.group(1)[4].isdigit(), name[: one.start()][-1:].isalpha())):
         with suppress(BadInput):
             if FIRST <= (date := date_of(found.group(1))) < LAST:
                 return date
@@ -115,27 +141,32 @@ def _date_in(name: str) -> datetime | None:
 
 def compiled(pattern: str) -> re.Pattern[str]:
     """The pattern as a regular expression. Raises BadInput for unknown names in braces, or a repeated name."""
-    text = "".join(PARTS.get(part, re.escape(part)) for part in re.split(r"(\{\w*\}|\*)", pattern))
-    unknown = [part for part in re.findall(r"\{\w*\}", pattern) if part not in PARTS]
+    text = "".join(PARTS.get(part, re.escape(part)) for part in re.split(r"(\{[^}]*\}|\*)", pattern))
+    unknown = [part for part in re.findall(r"\{[^}]*\}", pattern) if part not in PARTS]
     twice = [part for part in PARTS if part != "*" and pattern.count(part) > 1]
     if unknown or twice:
         raise BadInput("pattern", repr(pattern), "{machine}, {axis} and {date}, each once, and *", f"Write for example {EXAMPLE}.")
     return re.compile(f"(?:^|/){text}$")
 
 
-def date_of(text: str) -> datetime:
+def date_of(text: str, what: str = "date") -> datetime:
     """A date, in UTC if no zone is given. Raises BadInput."""
     zone = re.search(rf"{ZONE}$", text)
     local = re.sub(r"[^\d]", "", text[: zone.start()] if zone else text)
-    digits, name = (local, zone.group().replace("Z", "+00:00")) if zone and len(local) in (12, 14) else (re.sub(r"[^\d]", "", text), "+00:00")
+    digits, name = (local, _offset(zone.group())) if zone and len(local) in (12, 14) else (re.sub(r"[^\d]", "", text), "+0000")
     try:
         if re.fullmatch(DATE, text) and len(digits) in (8, 12, 14):
             form = "%Y%m%d%H%M%S"[: {8: 6, 12: 10, 14: 12}[len(digits)]]
             return datetime.strptime(f"{digits} {name}", f"{form} %z").astimezone(UTC)
         found = datetime.fromisoformat(text)
     except ValueError:
-        raise BadInput("date", repr(text), "a day and a time of day", "Write for example 2026-03-03 or 2026-03-03T14:30:00.") from None
+        raise BadInput(what, repr(text), "a day and a time of day", "Write for example 2026-03-03 or 2026-03-03T14:30:00.") from None
     return found.astimezone(UTC) if found.tzinfo else found.replace(tzinfo=UTC)
+
+
+def _offset(zone: str) -> str:
+    """A zone as +hhmm."""
+    return "+0000" if zone == "Z" else zone[0] + re.sub(r"[^\d]", "", zone).ljust(4, "0")
 
 
 def date_within(recording: Recording) -> datetime | None:

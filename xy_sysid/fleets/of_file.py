@@ -56,10 +56,13 @@ def rows_of_file(task: Task) -> Done:
     path, follow = Path(task.path), tuple(task.names.follow)
     try:
         content = digest(path)
-    except OSError as error:
-        return Done(task.path, (failed(task.path, "reading", f"cannot be read ({error.strerror or error}). Check the path and the permissions."),))
-    except BadRecording as problem:
-        return Done(task.path, (failed(task.path, "reading", str(problem)),))
+    except (OSError, BadRecording) as error:
+        text = f"cannot be read ({error.strerror or error}). Check the path and the permissions." if isinstance(error, OSError) else str(error)
+        row = failed(task.path, "reading", text)
+        with suppress(BadInput):
+            name = name_of(path, task.names)
+            row |= {"machine": name.machine, "date": name.date}
+        return Done(task.path, (row,))
     try:
         name = name_of(path, task.names)
     except BadInput as problem:
@@ -108,8 +111,9 @@ def _origin(task: Task, name: Name, content: str) -> Row:
 
 def failed(path: str, stage: str, problem: str) -> Row:
     """The row of a recording that could not be read, with the reason; the folder is used as the machine."""
-    text = problem.removeprefix(f"{path}: ")
-    return {"machine": Path(path).absolute().parent.name, "axis": "", "source": path, "stage": stage, "problem": text, "file_sha256": "", "key": ""}
+    text, folder = problem.removeprefix(f"{path}: "), Path(path).absolute().parent.name
+    own: Row = {"machine": folder, "axis": "", "date": None, "source": path, "file_sha256": "", "key": ""}
+    return own | {"stage": stage, "problem": text}
 
 
 def key_of(task: Task, name: Name, content: str) -> str:

@@ -17,7 +17,7 @@ from xy_sysid.fleets.engine import Cluster, connected, dask, processes, results
 from xy_sysid.fleets.estimate import Progress
 from xy_sysid.fleets.finding import recordings
 from xy_sysid.fleets.journal import journal
-from xy_sysid.fleets.naming import Names, compiled
+from xy_sysid.fleets.naming import Names, check, fits, unused
 from xy_sysid.fleets.of_file import Done, Task, rows_of_file
 from xy_sysid.fleets.reference import COLUMNS, References
 from xy_sysid.fleets.table import Known, arrow, as_table, read, rows_so_far
@@ -44,13 +44,12 @@ class Analysis:
         return Task(path=str(path.absolute()), names=self.names, reading=self.reading, effect_files=own)
 
     def check(self) -> None:
-        """Raises BadInput for unknown names of effects or an invalid pattern, before any work."""
+        """Raises BadInput for unknown names of effects, an invalid pattern or an invalid date, before any work."""
         known = library(self.effect_files)
         for name in self.names.follow:
             if known[name].category == "base":
                 raise BadInput("follow", name, "an effect that is not in every model already", "Leave it out.")
-        if self.names.pattern:
-            compiled(self.names.pattern)
+        check(self.names)
 
 
 def fleet(
@@ -83,12 +82,13 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
     dask()
     how.check()
     found = recordings([paths] if isinstance(paths, (str, Path)) else paths, folder)
+    fits(how.names, found)
     with journal(folder, library(how.effect_files)) as kept, ExitStack() as stack:
         before = rows_so_far(folder, COLUMNS)
         known = Known(before, {str(path) for path in found})
         tasks = [dataclasses.replace(how.task(path), known=known.of(path)) for path in found]
         client = stack.enter_context(connected(where)) if isinstance(where, Cluster) else where
-        now = Progress(total=len(tasks), workers=processes(client), place=client.dashboard_link)
+        now = Progress(total=len(tasks), workers=processes(client), place=client.dashboard_link, unused=unused(how.names, found))
         tell(now)
         begun = perf_counter()
         for done, seconds in _in_order(client, References(tasks, before)):
@@ -97,6 +97,7 @@ def run(paths: Paths, folder: Path, how: Analysis, where: Cluster | Client, tell
             now = dataclasses.replace(
                 now,
                 done=now.done + 1,
+                workers=now.workers or processes(client),
                 unchanged=now.unchanged + done.unchanged,
                 failed=now.failed + any(row.get("problem") for row in done.rows),
                 elapsed=perf_counter() - begun,

@@ -22,9 +22,13 @@ UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 def seconds(text: str) -> float:
     """A duration in s from text like 10min, 90s or 1h. Raises BadInput."""
     found = re.fullmatch(r"(\d+(?:\.\d*)?)\s*(s|min|h|d|)", text.strip())
-    if found is None or float(found.group(1)) * UNITS[found.group(2)] < SHORTEST:
-        raise BadInput("--every", repr(text), f"a time of {SHORTEST:g} s or more", "Write for example 10min, 90s or 1h.")
-    return float(found.group(1)) * UNITS[found.group(2)]
+    act = "Write for example 10min, 90s or 1h."
+    if found is None:
+        raise BadInput("--every", repr(text), "a number and one of the units s, min, h and d", act)
+    every = float(found.group(1)) * UNITS[found.group(2)]
+    if every < SHORTEST:
+        raise BadInput("--every", repr(text), f"a time of {SHORTEST:g} s or more", act)
+    return every
 
 
 def rows_of_parts(path: Path, every: float, how: Analysis, tell: Callable[[int], None] = lambda _: None) -> list[Row]:

@@ -26,6 +26,7 @@ ENDING = ".parquet"
 ORDER = ["machine", "axis", "date", "source"]
 KNOWS = ("source", "file_sha256", "date", "axis")  # columns that identify a recording
 NAMED = re.compile(r"[^\w.-]+")
+LONGEST = 255 - len(f"-01234567{ENDING}")  # bytes of a machine in a file name: file systems allow 255 with hash and ending
 
 
 def arrow() -> Any:
@@ -56,12 +57,19 @@ def _told(item: Column) -> dict[str, str]:
 
 
 def as_table(rows: Iterable[Row], library: Library = STANDARD) -> pyarrow.Table:
-    """The rows in the table's order; columns unknown to the library, for example of another run's own effects, come last."""
+    """The rows in the table's order; columns unknown to the library, for example of another run's own effects, come last.
+
+    A byte of a path that is not UTF-8 becomes a question mark, since Parquet cannot hold it.
+    """
     pa, known = arrow(), schema(library)
-    ordered = sorted(rows, key=_place)
+    ordered = sorted(({name: _text(value) for name, value in row.items()} for row in rows), key=_place)
     others = dict.fromkeys(name for row in ordered for name in row if name not in known.names)
     more = [pa.field(name, pa.infer_type([row.get(name) for row in ordered])) for name in others]
     return pa.Table.from_pylist(ordered, schema=pa.schema([*known, *more]))
+
+
+def _text(value: Any) -> Any:
+    return value.encode(errors="replace").decode() if isinstance(value, str) else value
 
 
 def _place(row: Row) -> tuple[str, str, bool, datetime | None, str]:
@@ -81,9 +89,13 @@ def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
     Raises BadRecording if it is not a table of a fleet.
     """
     pa = arrow()
+    if folder.is_file() and folder.suffix != ENDING:
+        act = "Give the folder that xy-sysid fleet made; to compare the parts of one recording, add --every 10min."
+        raise BadRecording(folder, "not a table of a fleet", act)
     files = _files(folder)
     if not files:
-        raise BadRecording(folder, "no Parquet files in it", "Make the table first: xy-sysid fleet PATH -o TABLE.")
+        problem = "no Parquet files in it" if folder.exists() else "does not exist"
+        raise BadRecording(folder, problem, "Make the table first: xy-sysid fleet PATH -o TABLE.")
     parts = [_of_file(file) for file in files]
     try:
         found = pa.concat_tables(parts, promote_options="default")
@@ -92,6 +104,12 @@ def read(folder: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
     missing = [name for name in names or ("machine", "axis", "date") if name not in found.column_names]
     if missing:
         raise BadRecording(folder, f"no column {missing[0]!r}", "Give a table that xy-sysid fleet made.")
+    known = schema()
+    kinds = [known.field(field.name) if field.name in known.names else field for field in found.schema]
+    try:
+        found = found.cast(pa.schema(kinds))
+    except pa.ArrowException as error:
+        raise BadRecording(folder, f"a column of another kind ({_first_line(error)})", "Give a table that xy-sysid fleet made.") from None
     return found.select(list(names)) if names is not None else found
 
 
@@ -112,7 +130,7 @@ def _of_file(file: Path, names: Sequence[str] | None = None) -> pyarrow.Table:
     try:
         return pa.parquet.read_table(file, columns=None if names is None else list(names), partitioning=None)
     except (OSError, pa.ArrowException) as error:
-        act = "Remove it, and run xy-sysid fleet again."
+        act = "If xy-sysid fleet made it, move it away and run xy-sysid fleet again."
         raise BadRecording(file, f"cannot be read as Parquet ({_first_line(error)})", act) from None
 
 
@@ -124,24 +142,35 @@ def merged(folder: Path, rows: Iterable[Row], library: Library = STANDARD) -> No
     """Merge rows into the table.
 
     A recording replaces rows of the same source, with any machine name, and rows of the same content and name under another
-    source. Values that the new rows do not contain are kept, with their columns.
+    source. Values that the new rows do not contain are kept, with their columns. If a machine's file cannot be read or written, the rows of all
+    other machines are merged nevertheless, and then BadRecording is raised.
     """
     new: dict[str, list[Row]] = {}
     for row in rows:
         new.setdefault(row["machine"], []).append(row)
     sources = {row["source"] for own in new.values() for row in own}
     places = {folder / file_name(machine): own for machine, own in new.items()}
+    problems = []
     for path in sorted({*_files(folder), *places}):
-        own = _each_once(places.get(path, []))
-        stays = _stay(path, sources, own) if path.is_file() else []
-        if own and any(stays):
-            write(_together(_of_file(path).filter(stays), as_table(own, library)), path)
-        elif own:
-            write(as_table(own, library), path)
-        elif not any(stays):
-            path.unlink()
-        elif not all(stays):
-            write(_of_file(path).filter(stays), path)
+        try:
+            _merged(path, sources, _each_once(places.get(path, [])), library)
+        except BadRecording as problem:
+            problems.append(problem)
+    if problems:
+        raise problems[0]
+
+
+def _merged(path: Path, sources: Collection[str], own: Sequence[Row], library: Library) -> None:
+    """Merge its own rows into a machine's file, and remove rows of ``sources``; a file without rows is removed."""
+    stays = _stay(path, sources, own) if path.is_file() else []
+    if own and any(stays):
+        write(_together(_of_file(path).filter(stays), as_table(own, library)), path)
+    elif own:
+        write(as_table(own, library), path)
+    elif not any(stays):
+        path.unlink()
+    elif not all(stays):
+        write(_of_file(path).filter(stays), path)
 
 
 def _stay(path: Path, sources: Collection[str], own: Sequence[Row]) -> list[bool]:
@@ -171,15 +200,15 @@ def _with(table: pyarrow.Table, whole: pyarrow.Schema) -> pyarrow.Table:
     return pa.Table.from_arrays(arrays, schema=whole)
 
 
-def _each_once(rows: Sequence[Row]) -> list[Row]:
-    """The last of all rows of the same axis of the same recording, which may be stored in two places."""
-    return list({(row["key"] or row["source"], row["axis"]): row for row in rows}.values())
+def _each_once(rows: Iterable[Row]) -> list[Row]:
+    """The last of all rows of the same axis, date and content, which may be stored in two places."""
+    return list({(row.get("file_sha256") or row["source"], row.get("date"), row["axis"]): row for row in rows}.values())
 
 
 def file_name(machine: str) -> str:
-    """File name for a machine: its name, or a plain form of it with a hash if the name is not a valid file name."""
-    plain = NAMED.sub("_", machine).strip("._") or "machine"
-    return f"{plain}{ENDING}" if plain == machine else f"{plain}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}{ENDING}"
+    """File name for a machine: its name, or a plain and possibly shorter form of it with a hash if the name is not a valid file name."""
+    plain = NAMED.sub("_", machine).encode()[:LONGEST].decode(errors="ignore").strip("._") or "machine"
+    return f"{plain}{ENDING}" if plain == machine else f"{plain}-{hashlib.sha256(machine.encode(errors='surrogateescape')).hexdigest()[:8]}{ENDING}"
 
 
 def rows_so_far(folder: Path, names: Sequence[str]) -> list[Row]:
