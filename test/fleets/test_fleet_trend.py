@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from helpers import ROOT
 from helpers.cli_tools import cli, npz, refused
-from helpers.fleet_tables import gain_falls, recorded, scattered_gains, unread
+from helpers.fleet_tables import BEGIN, gain_falls, recorded, scattered_gains, unread
 from helpers.html_pages import parsed
 
 import xy_sysid as xy
@@ -224,7 +225,7 @@ def gone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 MISSING = (
     "Recordings that could not be read: 6 (mill-00: 1, mill-01 with its newest: 5).",
     "Axes whose newest recordings have no answer: 1 (mill-02 x: 2).",
-    "Axes that are not compared, since fewer than 4 recordings have a date and an answer: 1 (mill-03 x: 3).",
+    "Axes that are not compared, since fewer than 4 recordings have a date, an answer and the units of the newest: 1 (mill-03 x: 3).",
 )
 
 
@@ -294,6 +295,52 @@ def test_causes_are_read_before_the_long_work(tmp_path: Path, monkeypatch: pytes
     """A missing file gives an error before any part of the recording is analysed."""
     monkeypatch.setattr("xy_sysid.fleets.parts.row_of", lambda *_: pytest.fail("a part was analysed"))
     assert "nowhere.yaml" in refused("trend", npz(tmp_path / "long.npz", rows=4_000), "--every", "1s", "--causes", tmp_path / "nowhere.yaml")
+
+
+@pytest.mark.parametrize(
+    ("load", "words", "part"),
+    [
+        (-0.2, "changed from -0.1 to -0.2 V since 11 May 2026 (+100 %, more than 99 sigma)", 1.0),
+        (-0.05, "changed from -0.1 to -0.05 V since 11 May 2026 (-50 %, more than 99 sigma)", -0.5),
+        (0.05, "changed from -0.1 to 0.05 V since 11 May 2026 (more than 99 sigma)", np.nan),
+    ],
+)
+def test_a_negative_value_changes_and_has_no_per_cent_across_zero(load: float, words: str, part: float) -> None:
+    """-0.2 V is less than -0.1 V, although its size is larger; and a value that changes its sign has no ratio."""
+    column = "constant_load_load"
+    found = of_rows(
+        [recorded("m1", k, gain, **{column: now, f"{column}_low": now - 1e-5, f"{column}_high": now + 1e-5})
+         for k, gain in enumerate(scattered_gains(1)) for now in [load if k >= 9 else -0.1]]
+    )  # fmt: skip
+    (event,) = found.events
+    assert f"{column} {words}" in sentence(event, found.axes[0])
+    assert event.moved[0].part == pytest.approx(part, rel=1e-3, nan_ok=True)
+
+
+def test_a_parameter_without_an_interval_has_no_error_of_a_recording(tmp_path: Path) -> None:
+    """A dash, not 0 %."""
+    merged(tmp_path, [recorded("m1", k, gain, noise=1e-6 * gain) for k, gain in enumerate(scattered_gains(1))])
+    (line,) = (line for line in cli("trend", tmp_path).out.splitlines() if line.startswith("noise"))
+    assert line.split()[-1] == "-"
+
+
+def test_recordings_of_one_date_have_no_order_and_the_command_says_so() -> None:
+    """The gain is halved after the seventh, which nobody can date."""
+    found = of_rows([recorded("m1", k, gain / (1 + (k > 7))) | {"date": BEGIN} for k, gain in enumerate(scattered_gains(1))])
+    assert gaps(found) == ["Axes on which no change can be found, since all recordings have the same date: 1 (m1 x: 14)."]
+
+
+def test_an_axis_whose_newest_recording_has_other_units_is_named_with_the_reason() -> None:
+    """All 14 recordings have a date and an answer."""
+    alone = [recorded("m1", k, gain, input_unit="A" if k == 13 else "V") for k, gain in enumerate(scattered_gains(1))]
+    found = of_rows([*alone, *(recorded("m2", k, gain) for k, gain in enumerate(scattered_gains(2)))])
+    assert "fewer than 4 recordings have a date, an answer and the units of the newest: 1 (m1 x: 1)." in gaps(found)[0]
+
+
+def test_a_recording_of_two_axes_counts_once() -> None:
+    """Its time, too."""
+    rows = [recorded("m1", k, gain) | {"date": BEGIN + timedelta(seconds=8 * k)} for k, gain in enumerate(scattered_gains(1, 5))]
+    assert summary(of_rows([*rows, *(row | {"axis": "y"} for row in rows)])) == "2 axes, 5 recordings, 32 s"
 
 
 @pytest.fixture(scope="module")

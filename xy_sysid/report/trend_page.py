@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from xy_sysid.fleets.history import Axis
 from xy_sysid.fleets.trends import Event, Trend, Trends
-from xy_sysid.fleets.words import chance, clocked, day, gaps, sentence, summary, told, widest
+from xy_sysid.fleets.words import chance, clocked, day, gaps, percent, sentence, summary, told, widest
 from xy_sysid.report.cover import Cover
 from xy_sysid.report.parts import plain, rows
 from xy_sysid.report.sheet import Drawing, block, listing, paragraph, section, table_html, whole
@@ -46,9 +46,9 @@ def trend_page(found: Trends, title: str) -> str:
         made.append(Drawing(f"plot-{column}", overview_figure(own), f"{column} of all axes over time", column))
     drawings += made
     parts.append(section("all", "All axes", made, OVER))
-    spreads = [(name, f"{100 * between:.2g}", f"{100 * own:.2g}") for name, between, own in widest(found)]
+    spreads = [(name, percent(between), percent(own)) for name, between, own in widest(found)]
     words = "Standard deviations, median over the axes. Where the first is larger, the interval of one recording is not valid for the next one."
-    table = Table("", ("parameter", "between recordings, %", "within one recording, %"), tuple(spreads))
+    table = Table("", ("parameter", "between recordings", "within one recording"), tuple(spreads))
     parts.append(block("spread", "Spread between recordings", words, table_html(table)))
     head = [sentence(one, axes[one.machine, one.axis]) for one in found.events] or ["Nothing changed."]
     about = "".join(paragraph(text) for text in (f"{summary(found)}.", *gaps(found)))
