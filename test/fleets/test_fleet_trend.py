@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 from helpers import ROOT
+from helpers.browser_tools import browser, needs_browser
 from helpers.cli_tools import cli, npz, refused
 from helpers.fleet_tables import BEGIN, gain_falls, recorded, scattered_gains, unread
-from helpers.html_pages import parsed
+from helpers.html_pages import parsed, plots
+from plotly.offline import get_plotlyjs
 
 import xy_sysid as xy
 from campaigns.bench.trend import FRICTION, PARAMETERS, axis, delays, limits, until
@@ -28,6 +30,7 @@ from xy_sysid.fleets.table import merged
 from xy_sysid.fleets.trends import of_axes, of_rows
 from xy_sysid.fleets.wander import Series, usual
 from xy_sysid.fleets.words import gaps, sentence, summary
+from xy_sysid.report.trend_page import overview_figure, trend_page
 
 LEVEL = 10.0  # log of the statistic, as for a weekly recording with seven parameters
 
@@ -375,6 +378,68 @@ def test_the_page_shows_every_parameter_and_opens_offline(table: Path, tmp_path:
     ids = re.findall(r'\bid="([^"]+)"', text.split('<script type="application/json"')[0])
     assert len(ids) == len(set(ids)), "a figure has a place of its own"
     assert "allowed: a name that is not there yet" in refused("trend", table, "-o", page)
+
+
+def test_the_page_shows_each_parameter_of_each_axis_with_its_interval(table: Path, tmp_path: Path) -> None:
+    """Also where nothing changed: one figure for each axis, and one of all axes, in which each has a name."""
+    page = tmp_path / "trend.html"
+    assert cli("trend", table, "-o", page).code == 0
+    found = plots(page.read_text(encoding="utf-8"))
+    for number in range(3):
+        (curve,) = found[f"axis-{number}"]["data"]
+        assert curve["mode"] == "markers" and curve["error_y"]["array"] and curve["name"] == "gain (mm/s/V)"
+        assert found[f"axis-{number}"]["layout"]["annotations"][0]["text"] == "gain (mm/s/V)"
+        assert len(found[f"axis-{number}"]["layout"].get("shapes", [])) == (2 if number == 1 else 0), "date of the change and its interval"
+    assert [curve["name"] for curve in found["plot-gain"]["data"]] == ["mill-01 x", "mill-00 x", "mill-02 x"]
+    assert all(curve["error_y"]["array"] and curve["showlegend"] for curve in found["plot-gain"]["data"])
+    assert all(one["layout"]["xaxis"]["hoverformat"] == "" for one in found.values()), "a date is no number"
+
+
+def test_the_lines_of_many_axes_are_one_curve_with_names() -> None:
+    """More axes than colours: the unchanged ones are grey together, and each point has the name of its axis."""
+    own = of_axes([axis(k, 5, 6) for k in range(8)], causes()).trends
+    (curve,) = overview_figure([one for one in own if one.history.column == "gain"]).data
+    assert len(curve.x) == len(curve.y) == len(curve.text) == 8 * 7 and set(curve.text) == {f"mill-{k:02d} x" for k in range(8)}
+
+
+def test_a_page_of_twenty_machines_is_small() -> None:
+    """Seven parameters of ten recordings each; most of the page is Plotly."""
+    found = of_axes([axis(k, 5, 10) for k in range(20)], causes())
+    assert len(trend_page(found, "table").encode()) < len(get_plotlyjs().encode()) + 500_000
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [1400, 400])
+def test_a_menu_of_the_page_shows_another_machine_and_another_parameter(tmp_path: Path, width: int) -> None:
+    """From a file, without a network; long names fit."""
+    page = tmp_path / "trend.html"
+    long = "Querträger-Übergabestation <b>" + "x" * 10 + " & Co, Halle 3, Linie 12, Platz 7"
+    column = "position_dependent_gain_period"
+    rows = [
+        recorded(name, k, gain, **{column: gain, f"{column}_low": gain, f"{column}_high": gain})
+        for number, name in enumerate((long, "mill"))
+        for k, gain in enumerate(scattered_gains(number))
+    ]
+    page.write_text(trend_page(of_rows(rows), "table"), encoding="utf-8")
+    with browser() as made:
+        tab = made.new_context(viewport={"width": width, "height": 900}, offline=True).new_page()
+        tab.goto(page.as_uri())
+        for name, place in (("machines", "axis-1"), ("all", f"plot-{column}")):
+            tab.locator(f"select[data-choice={name}]").select_option(index=1)
+            tab.locator(f"#{place}").scroll_into_view_if_needed()
+            tab.locator(f"#{place} .scatterlayer .trace").first.wait_for(timeout=10_000)
+            assert tab.locator(f"#{name} .plot:visible").count() == 1
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        cut = "[...document.querySelectorAll('#all > :not([hidden]) .legendtext')].every((text) => text.getBoundingClientRect().right <= innerWidth)"
+        assert tab.evaluate(cut), "no name is cut"
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_parameter_that_is_zero_is_drawn_over_its_interval() -> None:
+    """There is no per cent of 0: one interval's width is 100."""
+    found = of_rows([recorded("m1", k, 0.0, gain_low=-0.1, gain_high=0.1) for k in range(5)])
+    (curve,) = overview_figure(found.trends).data
+    assert np.all(np.asarray(curve.y) == 0.0) and np.all(np.asarray(curve.error_y.array) > 49.0)
 
 
 def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:
