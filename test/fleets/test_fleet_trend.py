@@ -411,7 +411,7 @@ def test_a_page_of_twenty_machines_is_small() -> None:
 @needs_browser
 @pytest.mark.parametrize("width", [1400, 400])
 def test_a_menu_of_the_page_shows_another_machine_and_another_parameter(tmp_path: Path, width: int) -> None:
-    """From a file, without a network; long names fit."""
+    """From a file, without a network; long names fit, and the whole table is in sight."""
     page = tmp_path / "trend.html"
     long = "Querträger-Übergabestation <b>" + "x" * 10 + " & Co, Halle 3, Linie 12, Platz 7"
     column = "position_dependent_gain_period"
@@ -430,6 +430,8 @@ def test_a_menu_of_the_page_shows_another_machine_and_another_parameter(tmp_path
             tab.locator(f"#{place} .scatterlayer .trace").first.wait_for(timeout=10_000)
             assert tab.locator(f"#{name} .plot:visible").count() == 1
         assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        inside = "[...document.querySelectorAll('.scroll')].every((box) => box.scrollWidth <= box.clientWidth)"
+        assert tab.evaluate(inside), "no column is cut"
         cut = "[...document.querySelectorAll('#all > :not([hidden]) .legendtext')].every((text) => text.getBoundingClientRect().right <= innerWidth)"
         assert tab.evaluate(cut), "no name is cut"
 

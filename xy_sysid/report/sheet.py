@@ -105,7 +105,7 @@ def table_html(table: Table) -> str:
         f'<th scope="col"{_long(long)}>{escape(text)}</th>' if text else "<td></td>" for text, long in zip(table.heads, told, strict=True)
     )
     rows = "".join(
-        f'<tr><th scope="row">{escape(first)}</th>'
+        f'<tr><th scope="row">{escape(first).replace("_", "_<wbr>")}</th>'
         f"{''.join(f'<td{_long(long)}>{escape(text)}</td>' for text, long in zip(rest, told[1:], strict=True))}</tr>"
         for first, *rest in table.rows
     )
