@@ -6,9 +6,14 @@ and what to do next, in one line, so that any surface can print it as it is.
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class XySysidError(Exception):
-    """Base of every error that a user can mend; its text is one line, fit to be shown."""
+    """Base of every error that a user can mend; its text is one line, fit to be shown. Another process can hand it back."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Exception.__new__, (type(self), *self.args), self.__dict__
 
 
 class BadInput(XySysidError):

@@ -92,7 +92,8 @@ def axis(number: int, seed: int, weeks: int = WEEKS) -> Axis:
         histories.append(
             History(column=what.column, unit="", dates=dates, value=value, low=value - width, high=value + width, logarithmic=True, level=what.value)
         )
-    return Axis(machine=f"mill-{number:02d}", axis="x", units=("V", "m"), dates=dates, histories=tuple(histories), named={}, left_out=0)
+    name, sources = f"mill-{number:02d}", frozenset(f"{number}-{week}" for week in range(weeks))
+    return Axis(name, "x", units=("V", "m"), dates=dates, histories=tuple(histories), named={}, left_out=0, sources=sources)
 
 
 def until(one: Axis, count: int) -> Axis:

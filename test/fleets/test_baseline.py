@@ -58,6 +58,15 @@ def test_a_parameter_that_left_its_interval_is_named_with_its_size_and_a_cause()
     assert float(values["coulomb_friction.coulomb by chance once in (axis-months)"]) > 1000.0
 
 
+def test_a_load_that_changes_its_sign_has_no_per_cent() -> None:
+    """Neither did it fall."""
+    known = estimate("constant_load.load", -0.1)
+    baseline = Baseline([known], {})
+    for k in range(AGREEING):
+        baseline.hear([replace(known, value=0.05)], k, k + 1)
+    assert "constant_load.load changed from -0.1 to 0.05 V. Likely" in status("x", baseline, causes(), 1000.0).message
+
+
 def test_what_lies_within_the_usual_spread_has_not_left() -> None:
     """Without a table, recordings of an unchanged axis are assumed to differ by 3 %."""
     assert heard(1.03, 0.95).level == OK

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from helpers import ROOT
+from helpers.browser_tools import browser, needs_browser
 from helpers.cli_tools import cli, npz, refused
-from helpers.fleet_tables import gain_falls, recorded, scattered_gains, unread
-from helpers.html_pages import parsed
+from helpers.fleet_tables import BEGIN, gain_falls, recorded, scattered_gains, unread
+from helpers.html_pages import parsed, plots
+from plotly.offline import get_plotlyjs
 
 import xy_sysid as xy
 from campaigns.bench.trend import FRICTION, PARAMETERS, axis, delays, limits, until
@@ -28,6 +31,7 @@ from xy_sysid.fleets.table import merged
 from xy_sysid.fleets.trends import of_axes, of_rows
 from xy_sysid.fleets.wander import Series, usual
 from xy_sysid.fleets.words import gaps, sentence, summary
+from xy_sysid.report.trend_page import overview_figure, trend_page
 
 LEVEL = 10.0  # log of the statistic, as for a weekly recording with seven parameters
 
@@ -225,7 +229,7 @@ def gone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 MISSING = (
     "Recordings that could not be read: 6 (mill-00: 1, mill-01 with its newest: 5).",
     "Axes whose newest recordings have no answer: 1 (mill-02 x: 2).",
-    "Axes that are not compared, since fewer than 4 recordings have a date and an answer: 1 (mill-03 x: 3).",
+    "Axes that are not compared, since fewer than 4 recordings have a date, an answer and the units of the newest: 1 (mill-03 x: 3).",
 )
 
 
@@ -313,6 +317,52 @@ def test_causes_are_read_before_the_long_work(tmp_path: Path, monkeypatch: pytes
     assert "nowhere.yaml" in refused("trend", npz(tmp_path / "long.npz", rows=4_000), "--every", "1s", "--causes", tmp_path / "nowhere.yaml")
 
 
+@pytest.mark.parametrize(
+    ("load", "words", "part"),
+    [
+        (-0.2, "changed from -0.1 to -0.2 V since 11 May 2026 (+100 %, more than 99 sigma)", 1.0),
+        (-0.05, "changed from -0.1 to -0.05 V since 11 May 2026 (-50 %, more than 99 sigma)", -0.5),
+        (0.05, "changed from -0.1 to 0.05 V since 11 May 2026 (more than 99 sigma)", np.nan),
+    ],
+)
+def test_a_negative_value_changes_and_has_no_per_cent_across_zero(load: float, words: str, part: float) -> None:
+    """-0.2 V is less than -0.1 V, although its size is larger; and a value that changes its sign has no ratio."""
+    column = "constant_load_load"
+    found = of_rows(
+        [recorded("m1", k, gain, **{column: now, f"{column}_low": now - 1e-5, f"{column}_high": now + 1e-5})
+         for k, gain in enumerate(scattered_gains(1)) for now in [load if k >= 9 else -0.1]]
+    )  # fmt: skip
+    (event,) = found.events
+    assert f"{column} {words}" in sentence(event, found.axes[0])
+    assert event.moved[0].part == pytest.approx(part, rel=1e-3, nan_ok=True)
+
+
+def test_a_parameter_without_an_interval_has_no_error_of_a_recording(tmp_path: Path) -> None:
+    """A dash, not 0 %."""
+    merged(tmp_path, [recorded("m1", k, gain, noise=1e-6 * gain) for k, gain in enumerate(scattered_gains(1))])
+    (line,) = (line for line in cli("trend", tmp_path).out.splitlines() if line.startswith("noise"))
+    assert line.split()[-1] == "-"
+
+
+def test_recordings_of_one_date_have_no_order_and_the_command_says_so() -> None:
+    """The gain is halved after the seventh, which nobody can date."""
+    found = of_rows([recorded("m1", k, gain / (1 + (k > 7))) | {"date": BEGIN} for k, gain in enumerate(scattered_gains(1))])
+    assert gaps(found) == ["Axes on which no change can be found, since all recordings have the same date: 1 (m1 x: 14)."]
+
+
+def test_an_axis_whose_newest_recording_has_other_units_is_named_with_the_reason() -> None:
+    """All 14 recordings have a date and an answer."""
+    alone = [recorded("m1", k, gain, input_unit="A" if k == 13 else "V") for k, gain in enumerate(scattered_gains(1))]
+    found = of_rows([*alone, *(recorded("m2", k, gain) for k, gain in enumerate(scattered_gains(2)))])
+    assert "fewer than 4 recordings have a date, an answer and the units of the newest: 1 (m1 x: 1)." in gaps(found)[0]
+
+
+def test_a_recording_of_two_axes_counts_once() -> None:
+    """Its time, too."""
+    rows = [recorded("m1", k, gain) | {"date": BEGIN + timedelta(seconds=8 * k)} for k, gain in enumerate(scattered_gains(1, 5))]
+    assert summary(of_rows([*rows, *(row | {"axis": "y"} for row in rows)])) == "2 axes, 5 recordings, 32 s"
+
+
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three axes, one of which loses gain in May."""
@@ -345,6 +395,70 @@ def test_the_page_shows_every_parameter_and_opens_offline(table: Path, tmp_path:
     ids = re.findall(r'\bid="([^"]+)"', text.split('<script type="application/json"')[0])
     assert len(ids) == len(set(ids)), "a figure has a place of its own"
     assert "allowed: a name that is not there yet" in refused("trend", table, "-o", page)
+
+
+def test_the_page_shows_each_parameter_of_each_axis_with_its_interval(table: Path, tmp_path: Path) -> None:
+    """Also where nothing changed: one figure for each axis, and one of all axes, in which each has a name."""
+    page = tmp_path / "trend.html"
+    assert cli("trend", table, "-o", page).code == 0
+    found = plots(page.read_text(encoding="utf-8"))
+    for number in range(3):
+        (curve,) = found[f"axis-{number}"]["data"]
+        assert curve["mode"] == "markers" and curve["error_y"]["array"] and curve["name"] == "gain (mm/s/V)"
+        assert found[f"axis-{number}"]["layout"]["annotations"][0]["text"] == "gain (mm/s/V)"
+        assert len(found[f"axis-{number}"]["layout"].get("shapes", [])) == (2 if number == 1 else 0), "date of the change and its interval"
+    assert [curve["name"] for curve in found["plot-gain"]["data"]] == ["mill-01 x", "mill-00 x", "mill-02 x"]
+    assert all(curve["error_y"]["array"] and curve["showlegend"] for curve in found["plot-gain"]["data"])
+    assert all(one["layout"]["xaxis"]["hoverformat"] == "" for one in found.values()), "a date is no number"
+
+
+def test_the_lines_of_many_axes_are_one_curve_with_names() -> None:
+    """More axes than colours: the unchanged ones are grey together, and each point has the name of its axis."""
+    own = of_axes([axis(k, 5, 6) for k in range(8)], causes()).trends
+    (curve,) = overview_figure([one for one in own if one.history.column == "gain"]).data
+    assert len(curve.x) == len(curve.y) == len(curve.text) == 8 * 7 and set(curve.text) == {f"mill-{k:02d} x" for k in range(8)}
+
+
+def test_a_page_of_twenty_machines_is_small() -> None:
+    """Seven parameters of ten recordings each; most of the page is Plotly."""
+    found = of_axes([axis(k, 5, 10) for k in range(20)], causes())
+    assert len(trend_page(found, "table").encode()) < len(get_plotlyjs().encode()) + 500_000
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [1400, 400])
+def test_a_menu_of_the_page_shows_another_machine_and_another_parameter(tmp_path: Path, width: int) -> None:
+    """From a file, without a network; long names fit, and the whole table is in sight."""
+    page = tmp_path / "trend.html"
+    long = "Querträger-Übergabestation <b>" + "x" * 10 + " & Co, Halle 3, Linie 12, Platz 7"
+    column = "position_dependent_gain_period"
+    rows = [
+        recorded(name, k, gain, **{column: gain, f"{column}_low": gain, f"{column}_high": gain})
+        for number, name in enumerate((long, "mill"))
+        for k, gain in enumerate(scattered_gains(number))
+    ]
+    page.write_text(trend_page(of_rows(rows), "table"), encoding="utf-8")
+    with browser() as made:
+        tab = made.new_context(viewport={"width": width, "height": 900}, offline=True).new_page()
+        tab.goto(page.as_uri())
+        for name, place in (("machines", "axis-1"), ("all", f"plot-{column}")):
+            tab.locator(f"select[data-choice={name}]").select_option(index=1)
+            tab.locator(f"#{place}").scroll_into_view_if_needed()
+            tab.locator(f"#{place} .scatterlayer .trace").first.wait_for(timeout=10_000)
+            assert tab.locator(f"#{name} .plot:visible").count() == 1
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        inside = "[...document.querySelectorAll('.scroll')].every((box) => box.scrollWidth <= box.clientWidth)"
+        assert tab.evaluate(inside), "no column is cut"
+        cut = "[...document.querySelectorAll('#all > :not([hidden]) .legendtext')].every((text) => text.getBoundingClientRect().right <= innerWidth)"
+        assert tab.evaluate(cut), "no name is cut"
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_parameter_that_is_zero_is_drawn_over_its_interval() -> None:
+    """There is no per cent of 0: one interval's width is 100."""
+    found = of_rows([recorded("m1", k, 0.0, gain_low=-0.1, gain_high=0.1) for k in range(5)])
+    (curve,) = overview_figure(found.trends).data
+    assert np.all(np.asarray(curve.y) == 0.0) and np.all(np.asarray(curve.error_y.array) > 49.0)
 
 
 def test_one_long_recording_is_a_trend_of_its_parts(tmp_path: Path) -> None:

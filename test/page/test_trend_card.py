@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from helpers.browser_tools import Server, Tab, browser, needs_browser
 from helpers.cli_tools import cli
-from helpers.fleet_tables import gain_falls
+from helpers.fleet_tables import gain_falls, recorded
+from nicegui import run
 
 from xy_sysid.errors import BadInput
+from xy_sysid.fleets.table import merged
+from xy_sysid.page.beside import beside, returned
 from xy_sysid.page.shelf import Shelf
-from xy_sysid.page.trend_card import find, tables
+from xy_sysid.page.trend_card import find, found, tables
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +54,24 @@ def test_a_table_is_opened_and_its_change_is_told_as_by_the_command(server: Serv
         tab.until(lambda: drawn(tab, "gain of mill-01 x over time") and drawn(tab, "gain of all axes over time"), 30.0)
         assert tab.wide() <= width
         assert tab.errors == []
+
+
+@pytest.mark.parametrize(("table", "words"), [("short", "allowed: an axis with 4 of them"), ("damaged", "a.parquet: cannot be read as Parquet")])
+def test_a_table_without_a_trend_is_told_in_the_words_of_the_command(table: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error of the other process arrives on the page, not a request to report it."""
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / "a.parquet").write_bytes(b"PAR1")
+    (tmp_path / "short").mkdir()
+    merged(tmp_path / "short", [recorded("mill-00", 0, 0.1)])
+    said: list[str] = []
+    session: Any = SimpleNamespace(say=said.append)
+    monkeypatch.setattr(run, "process_pool_start_method", "spawn")
+    run.setup()
+    try:
+        assert asyncio.run(beside(session, lambda: run.cpu_bound(returned, found, tmp_path / table))) is None
+    finally:
+        run.reset()
+    assert len(said) == 1 and words in said[0]
 
 
 def drawn(tab: Tab, label: str) -> bool:

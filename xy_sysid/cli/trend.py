@@ -51,7 +51,7 @@ def trend(
     from xy_sysid.fleets.parts import rows_of_parts, seconds
     from xy_sysid.fleets.trends import of_rows
     from xy_sysid.fleets.trends import trend as logic
-    from xy_sysid.fleets.words import gaps, sentence, summary, widest
+    from xy_sysid.fleets.words import gaps, percent, sentence, summary, widest
     from xy_sysid.imports.reading import Reading
 
     o.output_file("--out", out, force, ".html")
@@ -89,7 +89,7 @@ def trend(
         say(f"- {sentence(event, axes[event.machine, event.axis])}")
     if not found.events:
         say("Nothing changed.")
-    rows = [(name, f"{100 * between:.2g} %", f"{100 * own:.2g} %") for name, between, own in widest(found)[:SHOWN]]
+    rows = [(name, percent(between), percent(own)) for name, between, own in widest(found)[:SHOWN]]
     table("spread between recordings (it is in the intervals)", ("parameter", "between recordings", "within one"), rows)
     if out is not None:
         say(f"wrote {out}")

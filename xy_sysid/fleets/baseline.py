@@ -38,7 +38,7 @@ class Compared:
     """One parameter at commissioning and now.
 
     before, now: its value at commissioning and in the newest stretch; low, high: 95 % interval of an unchanged axis, with the spread between
-        recordings; part: now over before, minus 1
+        recordings; part: now over before, minus 1; NaN across zero
     statistic: least log statistic of the newest ``AGREEING`` estimates; -inf before there are that many
     left: True if it has left its interval; one_in: axis-months in which chance alone gives such evidence once
     """
@@ -162,7 +162,7 @@ class Baseline:
         least = min(every) if len(every) == AGREEING else -math.inf
         return Compared(
             name=item.name, unit=item.unit, before=before.value, now=item.value, low=low, high=high,
-            part=item.value / before.value - 1.0 if before.value else math.nan,
+            part=item.value / before.value - 1.0 if item.value * before.value > 0.0 else math.nan,
             statistic=least, left=least >= level, one_in=axis_months * math.exp(min(least - level, 300.0)),
         )  # fmt: skip
 

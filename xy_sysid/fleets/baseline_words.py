@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 from xy_sysid.fleets.baseline import AGREEING, Baseline, Compared
 from xy_sysid.fleets.causes import Causes
+from xy_sysid.fleets.words import from_to
 from xy_sysid.live.plain_messages import OK, WARN, StatusMessage
-from xy_sysid.units import readable
 
 ONCE = 1e9  # axis-months; above this the exact number carries no information
 
@@ -50,9 +51,8 @@ def told(left: Sequence[Compared]) -> str:
 
 
 def _told(item: Compared) -> str:
-    scale, unit = readable(item.unit)
-    verb = "rose" if abs(item.now) > abs(item.before) else "fell"
-    return f"{item.name} {verb} from {item.before * scale:.4g} to {item.now * scale:.4g} {unit}".rstrip() + f" ({100 * item.part:+.3g} %)"
+    size = f" ({100 * item.part:+.3g} %)" if math.isfinite(item.part) else ""
+    return f"{item.name} {from_to(item.before, item.now, item.unit)}{size}"
 
 
 def _values(item: Compared) -> tuple[tuple[str, str], ...]:

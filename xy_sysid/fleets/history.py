@@ -67,7 +67,7 @@ class Axis:
     units: of input and output in its last recording with an answer; dates: (n,) of its recordings in these units
     histories: of every parameter with enough values; named: effect -> (n,) whether it was named
     left_out: number of recordings without a date or an answer; other_units: number with an answer in other units, also left out
-    silent: number of its newest recordings without an answer
+    silent: number of its newest recordings without an answer; sources: of the recordings in these units, once each
     """
 
     machine: str
@@ -79,6 +79,7 @@ class Axis:
     left_out: int
     other_units: int = 0
     silent: int = 0
+    sources: frozenset[str] = frozenset()
 
     @property
     def months(self) -> float:
@@ -136,6 +137,7 @@ def _axis(machine: str, axis: str, rows: Sequence[Mapping[str, Any]], units: Map
         left_out=len(rows) - len(dated),
         other_units=len(dated) - len(alike),
         silent=sum(not dated or row["date"] > dated[-1]["date"] for row in every),
+        sources=frozenset(row["source"] for row in alike),
     )
 
 

@@ -34,7 +34,7 @@ class Moved:
 
     column, unit: of the table; before, after: its value; ``low`` to ``high``: 95 % interval of the value after; for an effect that is
         named or no longer named, the fraction of recordings that name it
-    part:  after over before, minus 1; sigmas: size over its standard error; NaN for an effect
+    part:  after over before, minus 1; sigmas: size over its standard error; both NaN for an effect, part also across zero
     since: date of the first recording with it; earliest, latest: 95 % interval of that; declared: date from which it was certain enough
     one_in: axis-months in which chance alone gives such evidence once
     duration: days that the change took, until the last recording at most
@@ -262,7 +262,7 @@ def _moved(history: History, item: Change, level: float, axis_months: float, mea
         after=after,
         low=ends[0],
         high=ends[1],
-        part=after / before - 1.0 if before else math.nan,
+        part=after / before - 1.0 if after * before > 0.0 else math.nan,
         sigmas=abs(item.size) / max(item.sigma, 1e-12),
         since=dates[item.after + 1],
         earliest=dates[item.first + 1],

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Awaitable, Callable, Sequence
 from typing import TypeVar
 
-from xy_sysid.errors import BadInput
+from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.page.session import Session
 from xy_sysid.processes.terminal import printable
 from xy_sysid.story.attempt import BROKEN, Attempt
@@ -15,11 +15,14 @@ from xy_sysid.story.attempt import BROKEN, Attempt
 Made = TypeVar("Made")
 
 
-async def beside(session: Session, work: Callable[[], Awaitable[Made]]) -> Made | None:
-    """The result of the work; None if it fails. The failure is shown on every page."""
+async def beside(session: Session, work: Callable[[], Awaitable[Made | Exception]]) -> Made | None:
+    """The result of the work; None if it fails. The failure, raised or returned, is shown on every page."""
     try:
         with Attempt(BROKEN) as attempt:
-            return await work()
+            made = await work()
+            if isinstance(made, Exception):
+                raise made
+            return made
         problem = attempt.problem
     except OSError as error:
         problem = f"{f'{error.filename}: ' if error.filename else ''}{error.strerror or BROKEN}"
@@ -27,6 +30,14 @@ async def beside(session: Session, work: Callable[[], Awaitable[Made]]) -> Made 
         sys.stderr.write(printable(attempt.detail) + "\n")
     session.say(problem)
     return None
+
+
+def returned(work: Callable[..., Made], *arguments: object) -> Made | XySysidError | OSError:
+    """The result or the error of a call. For another process: of an error that is raised there, NiceGUI hands on only the text."""
+    try:
+        return work(*arguments)
+    except (XySysidError, OSError) as error:
+        return error
 
 
 def asked(arguments: Sequence[str], what: tuple[str, str, str]) -> str:

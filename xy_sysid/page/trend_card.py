@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from nicegui import run, ui
 
 from xy_sysid.errors import BadInput
-from xy_sysid.page.beside import beside
+from xy_sysid.page.beside import beside, returned
 from xy_sysid.page.plot import Plot
 from xy_sysid.page.session import Session
 from xy_sysid.page.shelf import Shelf
@@ -59,7 +59,7 @@ class TrendCard:
         self._wait.set_visibility(True)
         self._open.disable()
         name = str(self._table.value)
-        self._found = await beside(self._session, lambda: run.cpu_bound(found, find(self._session.shelf, name)))
+        self._found = await beside(self._session, lambda: run.cpu_bound(returned, found, find(self._session.shelf, name)))
         self._name = name
         self._wait.set_visibility(False)
         self._open.enable()

@@ -5,6 +5,7 @@
   const config = { responsive: true, displayModeBar: false };
   const PAPER = { titles: 90, curves: 0.45, font: 11 }; // px of a figure's height that stay, the part of the rest that is kept, px of its words
   const drawn = new Set();
+  const shown = (name) => document.getElementById(name).offsetParent; // not one of a group that its menu hides
   let printing = false;
   const draw = (name) => {
     const plot = plots[name];
@@ -27,10 +28,15 @@
   const turn = (on) => {
     printing = on;
     document.documentElement.classList.toggle("printing", on);
-    (on ? Object.keys(plots) : [...drawn]).forEach(draw);
+    (on ? Object.keys(plots) : [...drawn]).filter(shown).forEach(draw);
   };
   addEventListener("beforeprint", () => turn(true));
   addEventListener("afterprint", () => turn(false));
+
+  // a menu shows one group of figures
+  addEventListener("change", ({ target }) => {
+    if (target.dataset.choice) [...document.getElementById(target.dataset.choice).children].forEach((group, place) => { group.hidden = place !== target.selectedIndex; });
+  });
 
   // keep a figure: as vectors, or its numbers
   const numbers = (values) => values && values.bdata ? Array.from(Plotly.Snapshot ? decoded(values) : []) : Array.from(values || []);

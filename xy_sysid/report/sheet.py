@@ -85,6 +85,14 @@ def pictures(drawings: Sequence[Drawing], caption: str, labelled_by: str = "") -
     )
 
 
+def chosen(name: str, title: str, what: str, groups: Mapping[str, Sequence[Drawing]], caption: str) -> str:
+    """Figures under a heading, of which a menu shows one group at a time. what: the label of the menu; groups: by the words of its entries."""
+    entries = "".join(f"<option>{escape(entry)}</option>" for entry in groups)
+    menu = f'<p><label>{escape(what)} <select data-choice="{name}" autocomplete="off">{entries}</select></label></p>'
+    shown = "".join(f"<div{' hidden' if place else ''}>{pictures(made, '')}</div>" for place, made in enumerate(groups.values()))
+    return f'<section><h2>{escape(title)}</h2>{menu}<div id="{name}">{shown}</div>{paragraph(caption)}</section>'
+
+
 def block(name: str, title: str, words: str, content: str) -> str:
     """Text and HTML under a heading."""
     return f'<section id="{name}"><h2>{escape(title)}</h2><p>{escape(words)}</p>{content}</section>'
@@ -97,7 +105,7 @@ def table_html(table: Table) -> str:
         f'<th scope="col"{_long(long)}>{escape(text)}</th>' if text else "<td></td>" for text, long in zip(table.heads, told, strict=True)
     )
     rows = "".join(
-        f'<tr><th scope="row">{escape(first)}</th>'
+        f'<tr><th scope="row">{escape(first).replace("_", "_<wbr>")}</th>'
         f"{''.join(f'<td{_long(long)}>{escape(text)}</td>' for text, long in zip(rest, told[1:], strict=True))}</tr>"
         for first, *rest in table.rows
     )
