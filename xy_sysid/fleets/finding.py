@@ -29,7 +29,8 @@ def recordings(paths: Iterable[Path | str], besides: Path | None = None) -> tupl
         for match in matches:
             found |= dict.fromkeys(_below(match, besides.absolute() if besides is not None else None))
     if not found:
-        raise BadInput("recordings", f"none in {', '.join(map(str, given))}", f"bags, or files that end with {', '.join(ENDINGS)}", "Check the path.")
+        what = f"number of recordings in {', '.join(map(str, given))}" if given else "number of paths"
+        raise BadInput(what, 0, f"bags, or files that end with {', '.join(ENDINGS)}", "Check the path.")
     return tuple(sorted(found))
 
 

@@ -52,7 +52,7 @@ class TrendCard:
                 self._axis = ui.select({}, label="axis", on_change=self._turn).props('outlined dense data-part="trend axis"').classes("pick")
                 self._columns = ui.select([], multiple=True, value=[], label="parameters", on_change=self._draw)
                 self._columns.props('outlined dense use-chips data-part="trend parameters"').classes("pick grow")
-            self._own = Plot(ABOUT, "trend", 320)
+            self._own = Plot(ABOUT, "trend", 250)
             self._over = ui.label("").props('data-part="trend of all axes"')
             self._all = Plot(OVER, "trend_of_all_axes", 280)
         card.set_visibility(bool(names))
