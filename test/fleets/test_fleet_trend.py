@@ -376,7 +376,7 @@ def test_the_command_names_the_change(table: Path) -> None:
     assert (
         "mill-01 x: gain fell from 100" in said.out and "since 25 May 2026" in said.out and "Likely cause: the amplifier or its supply." in said.out
     )
-    assert "1 rows without a date or an answer are left out" in said.out and said.out.count("\n- ") == 1
+    assert "; 1 row without a date or an answer is left out." in said.out and said.out.count("\n- ") == 1
     found = cli("trend", table, "--json").json
     (event,) = found["events"]
     (change,) = event["changes"]
@@ -501,8 +501,10 @@ def test_what_is_no_table_is_refused(tmp_path: Path, table: Path) -> None:
     assert "xy-sysid fleet PATH -o TABLE" in refused("trend", tmp_path)
     with pytest.raises(BadRecording):
         xy.trend(tmp_path / "nowhere")
-    with pytest.raises(BadInput, match="4 rows, 1 of which could not be read; allowed: an axis with 4 of them"):
+    with pytest.raises(BadInput, match="content of the table is 4 rows, 1 of which could not be read; allowed: an axis with 4 of them"):
         of_rows([unread("mill-00", 3), *(recorded("mill-00", k, 0.1) for k in range(3))])
+    with pytest.raises(BadInput, match="content of the table is 1 row, 0 of which"):
+        of_rows([recorded("mill-00", 0, 0.1)])
     assert "machine is mill-99; allowed: one of mill-00, mill-01, mill-02." in refused("trend", table, "--machine", "mill-99")
 
 

@@ -25,7 +25,7 @@ from xy_sysid.page.trend_card import find, found, tables
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("shelf")
-    gain_falls(made / "table")
+    gain_falls(made / "t")
     (made / "empty").mkdir()
     return made
 
@@ -49,10 +49,13 @@ def test_a_table_is_opened_and_its_change_is_told_as_by_the_command(server: Serv
         tab.press("trend")
         tab.until(lambda: events.count() == 1, 60.0)
         said = str(events.first.text_content())
-        assert f"- {said}" in cli("trend", folder / "table").out
+        assert f"- {said}" in cli("trend", folder / "t").out
         assert "Recordings that could not be read: 1 (mill-00: 1)." in str(tab.page.locator("[data-part=summary]:visible").text_content())
         tab.until(lambda: drawn(tab, "gain of mill-01 x over time") and drawn(tab, "gain of all axes over time"), 30.0)
         assert tab.wide() <= width
+        cut = "[...document.querySelectorAll('#trend .q-field__label')].some((label) => label.scrollWidth > label.clientWidth)"
+        assert not tab.page.evaluate(cut), "a label of a menu is cut, also for a short name"
+        assert tab.page.locator("[data-part='trend of all axes']").text_content() == "gain of all axes"
         assert tab.errors == []
 
 
@@ -83,8 +86,8 @@ def drawn(tab: Tab, label: str) -> bool:
 def test_only_folders_of_the_shelf_that_are_tables_can_be_opened(folder: Path) -> None:
     """The browser sends a name of the list, never a path."""
     shelf = Shelf(folder)
-    assert tables(shelf) == ["table"]
-    assert find(shelf, "table") == folder.resolve() / "table"
+    assert tables(shelf) == ["t"]
+    assert find(shelf, "t") == folder.resolve() / "t"
     with pytest.raises(BadInput, match="one of the list"):
         find(shelf, "../elsewhere")
 
@@ -101,7 +104,7 @@ def test_a_folder_that_cannot_be_read_has_no_table(folder: Path, monkeypatch: py
 
     monkeypatch.setattr(os, "scandir", scanned)
     monkeypatch.setattr(os, "listdir", lambda path: [entry.name for entry in scanned(path)])
-    assert tables(Shelf(folder)) == ["table"]
+    assert tables(Shelf(folder)) == ["t"]
     closed.rmdir()
 
 
@@ -114,4 +117,4 @@ def test_no_recording_is_asked_for_its_status(folder: Path, monkeypatch: pytest.
         return status(path, **how)
 
     monkeypatch.setattr(Path, "stat", asked)
-    assert tables(Shelf(folder)) == ["table"]
+    assert tables(Shelf(folder)) == ["t"]

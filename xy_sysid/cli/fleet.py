@@ -74,7 +74,7 @@ def fleet(
     if force:
         raise BadInput("--force", "given without --one", "with --one", "Leave it out: a table is updated, not replaced.")
     if not paths or out is None:
-        raise BadInput("PATH and -o", "not both given", "recordings or folders, and the table's folder", "Write: xy-sysid fleet PATH... -o TABLE.")
+        raise BadInput("PATH or -o", "missing", "recordings or folders, and the table's folder", "Write: xy-sysid fleet PATH... -o TABLE.")
     if out.is_file():
         raise BadInput("-o", str(out), "a folder, and this is a file", "Give the table another name.")
     begun, last = time.perf_counter(), [time.perf_counter()]

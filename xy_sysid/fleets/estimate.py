@@ -52,7 +52,7 @@ class Progress:
 
     def sentence(self) -> str:
         """The progress in words."""
-        parts = [f"{self.done} of {self.total} recordings"]
+        parts = [f"{self.done} of {self.total} recording{'s' if self.total != 1 else ''}"]
         if self.unchanged:
             parts.append(f"{self.unchanged} were in the table already")
         if self.failed:

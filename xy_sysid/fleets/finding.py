@@ -31,7 +31,8 @@ def recordings(paths: Iterable[Path | str], besides: Path | None = None) -> tupl
     if not found and besides in given:
         raise BadInput("-o", str(besides), "another folder than that of the recordings", "Write for example: -o table.")
     if not found:
-        raise BadInput("recordings", f"none in {', '.join(map(str, given))}", f"bags, or files that end with {', '.join(ENDINGS)}", "Check the path.")
+        what = f"number of recordings in {', '.join(map(str, given))}" if given else "number of paths"
+        raise BadInput(what, 0, f"bags, or files that end with {', '.join(ENDINGS)}", "Check the path.")
     return tuple(sorted(found))
 
 

@@ -169,8 +169,8 @@ def of_rows(
     every = axes(rows, followed)
     if not any(one.histories for one in every if one.machine in wanted):
         allowed = f"an axis with {FEWEST} of them that have a date and an answer"
-        given = f"{len(rows)} rows, {sum(one.recordings for one in unread(rows))} of which could not be read"
-        raise BadInput("recordings in the table", given, allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
+        given = f"{len(rows)} row{'s' if len(rows) != 1 else ''}, {sum(one.recordings for one in unread(rows))} of which could not be read"
+        raise BadInput("content of the table", given, allowed, "Record more often, or name their dates (xy-sysid fleet --names).")
     return replace(of_axes(every, known or causes(), axis_months, tell), unread=unread(rows)).of_machines(wanted)
 
 

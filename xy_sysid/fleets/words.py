@@ -75,7 +75,7 @@ def summary(trends: Trends) -> str:
     seen = f"{months:.3g} axis-months" if months >= 1.0 else lasting(DAY * MONTH * max((axis.months for axis in dated), default=0.0))
     axes = "1 axis" if len(dated) == 1 else f"{len(dated)} axes"
     text = f"{axes}, {len(frozenset[str]().union(*(axis.sources for axis in dated)))} recordings, {seen}"
-    return text + (f"; {out} rows without a date or an answer are left out" if out else "")
+    return text + (f"; {out} {'row' if out == 1 else 'rows'} without a date or an answer {'is' if out == 1 else 'are'} left out" if out else "")
 
 
 def gaps(trends: Trends) -> list[str]:

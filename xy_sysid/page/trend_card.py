@@ -25,7 +25,10 @@ ABOUT = (
     "Each point is the parameter of one recording. Its 95 % interval holds the recording's own error and the spread between recordings. "
     "The vertical line is the first recording after a change, the shaded part the 95 % interval of that date."
 )
-OVER = "The same parameter of all axes, in per cent of its median before any change. Coloured: the axes on which it changed."
+OVER = (
+    "The change of the parameter, in per cent of its median before any change. Coloured, with 95 % intervals: the axes on which it changed, or all "
+    "axes if there are few. Point at a grey line to see the name of its axis."
+)
 
 
 class TrendCard:
@@ -40,6 +43,7 @@ class TrendCard:
             ui.html("<h2>Trend</h2>", sanitize=False)
             with ui.element("div").classes("buttons"):
                 self._table = ui.select(names, value=names[0] if names else None, label="table").props('outlined dense data-part="table"')
+                self._table.classes("pick")
                 self._open = ui.button("Compare recordings", on_click=self._compare).props("outline dense data-act=trend")
             self._wait = ui.linear_progress(show_value=False).props('indeterminate aria-label="comparing recordings"')
             self._summary = ui.label("").props("role=status data-part=summary")
@@ -48,7 +52,8 @@ class TrendCard:
                 self._axis = ui.select({}, label="axis", on_change=self._turn).props('outlined dense data-part="trend axis"').classes("pick")
                 self._columns = ui.select([], multiple=True, value=[], label="parameters", on_change=self._draw)
                 self._columns.props('outlined dense use-chips data-part="trend parameters"').classes("pick grow")
-            self._own = Plot(ABOUT, "trend", 320)
+            self._own = Plot(ABOUT, "trend", 250)
+            self._over = ui.label("").props('data-part="trend of all axes"')
             self._all = Plot(OVER, "trend_of_all_axes", 280)
         card.set_visibility(bool(names))
         self._show(False)
@@ -84,7 +89,7 @@ class TrendCard:
 
     def _show(self, answered: bool) -> None:
         self._wait.set_visibility(False)
-        for part in (self._summary, self._events, self._choose, self._own.root, self._all.root):
+        for part in (self._summary, self._events, self._choose, self._own.root, self._over, self._all.root):
             part.set_visibility(answered)
 
     def _turn(self) -> None:
@@ -111,7 +116,8 @@ class TrendCard:
         self._own.say(f"{', '.join(one.history.column for one in own)} of {name} over time. {ABOUT}")
         column = own[0].history.column
         alike = [one for one in self._found.trends if one.history.column == column]
-        await self._all.show(self._session, ("trend of all", stamp, column), overview_figure, alike, column)
+        await self._all.show(self._session, ("trend of all", stamp, column), overview_figure, alike)
+        self._over.set_text(f"{column} of all axes")
         self._all.say(f"{column} of all axes over time. {OVER}")
 
 
