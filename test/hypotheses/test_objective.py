@@ -122,11 +122,3 @@ def test_a_fit_stays_at_the_answer(data: AxisData) -> None:
     again = finish(data, once.model)
     assert again.held_out_error == pytest.approx(once.held_out_error, rel=1e-3)
     assert again.excess <= once.excess + 1e-3
-
-
-def test_a_fit_at_the_answer_ends_without_new_derivatives(data: AxisData) -> None:
-    """It computes them once: a simulation for each parameter, one for the start, and a few steps."""
-    once = fit(data, fit_base(data).model.with_effect("coulomb_friction", (0.2,)))
-    again = finish(data, once.model)
-    assert again.converged
-    assert again.runs <= 1 + len(again.parameters) + LONG.rounds

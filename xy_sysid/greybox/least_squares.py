@@ -4,8 +4,7 @@ Levenberg 1944, Marquardt 1963. The error is divided by its spectrum according t
 again before each round: iteratively reweighted least squares. A round that does not lower the objective is undone, so a fit
 never ends worse than it starts.
 Derivatives are forward differences of the simulation. They are computed again only if a step did not lower the cost as predicted, and are
-otherwise updated with the result of the step (Broyden 1965). A round ends where neither the fall of the cost nor the predicted fall is large
-(MINPACK's test of ftol; Moré, Garbow & Hillstrom 1980), and then no derivatives are computed.
+otherwise updated with the result of the step (Broyden 1965).
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding err
 class Schedule:
     """When a solution ends.
 
-    rounds, steps: most sets of weights, and most steps with each; enough: a round ends if the cost falls by less, relatively, and was expected to;
+    rounds, steps: most sets of weights, and most steps with each; enough: relative fall of the cost that ends a round;
     settled: nats a line; a round that gains less is the last; late: once True, the solution ends after the present step
     """
 
@@ -187,14 +186,14 @@ def solve(
             if np.isfinite(new) and new < cost:
                 fall, taken = (cost - new) / cost, trial - inner
                 expected_decrease = -float(2.0 * slope @ taken + taken @ normal @ taken)
-                converged = max(fall, expected_decrease / cost) < schedule.enough  # both: outdated derivatives can make a step short
-                if converged or abs((cost - new) - expected_decrease) < TRUSTED * expected_decrease:
+                if abs((cost - new) - expected_decrease) < TRUSTED * expected_decrease:
                     change, exact = _updated(change, taken, diagonal, found - error), False
                 else:
                     change, exact = slopes(trial, found), True
                 inner, error, cost, fresh = trial, found, new, False
                 damping = max(damping * 0.2, 1e-9)
-                if converged:
+                if fall < schedule.enough:
+                    converged = True
                     break
             elif not exact:
                 change, exact, fresh = slopes(inner, error), True, False
