@@ -35,7 +35,7 @@ class Runnable(Protocol):
         ...
 
     def last_words(self) -> None:
-        """Called once, when the node ends or fails. Its publishers still work."""
+        """Called once, when the node ends or fails, while its publishers still work."""
         ...
 
     def destroy_node(self) -> None:
