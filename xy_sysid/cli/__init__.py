@@ -25,7 +25,9 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code: 0 answer, 1 failed check, 2 wrong use or bad input, 130 Ctrl-C, 143 SIGTERM."""
     from xy_sysid.errors import ReaderGone, XySysidError
     from xy_sysid.files.blame import blamed
+    from xy_sysid.processes.memory import keep_freed_memory
 
+    keep_freed_memory()
     try:
         with blamed():
             return _command(arguments)

@@ -150,7 +150,7 @@ class FilterFit:
     companions:   (k,) numbers of ``Companions``, and their standard errors
     innovation:   (n,) measured minus predicted position, one step ahead, m
     without:      (n,) innovations of the same filter (process noise, companions) without the effect, all else refitted, m
-    noise:        standard deviation of the encoder, m; runs: number of filter runs
+    noise:        standard deviation of the encoder, m; runs: number of filter runs; filtered: samples of all runs
     process_noise_factor: factor on the process noise that the filter assumes
     too_small:    True if the effect found is too small to count as present
     given_up:     True if the fit ended early, far above the bar
@@ -166,6 +166,7 @@ class FilterFit:
     without: FloatArray
     noise: float
     runs: int
+    filtered: int
     process_noise_factor: float = 1.0
     too_small: bool = False
     given_up: bool = False

@@ -18,6 +18,7 @@ from xy_sysid.fleets.of_file import Done, Task, lost, rows_of_file
 from xy_sysid.fleets.row import FAULT
 from xy_sysid.jit import cores
 from xy_sysid.processes.deaf import deaf
+from xy_sysid.processes.memory import ENVIRONMENT
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -34,8 +35,7 @@ HERE = {
     "distributed.worker.profile.enabled": False,  # it stores the stacks of an hour, 100 MB and more
     "distributed.nanny.pre-spawn-environ.NUMBA_NUM_THREADS": 1,  # as dask itself sets for BLAS
     # dask would return every array to the system at once: twice the processor time
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
-    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": 2**25,
+    **{f"distributed.nanny.pre-spawn-environ.{name}": size for name, size in ENVIRONMENT.items()},
 }
 
 

@@ -29,7 +29,7 @@ CLEAN = 1.6  # innovation over noise up to which it contains hardly anything els
 BETTER_AT_NOISE = 1.03  # replaces BETTER there: a gap of one encoder count gives 1.04 to 1.07
 TELLING = 0.005  # dry friction over rms voltage above which it is named
 
-FILTER_WORK = 2.0  # samples times sub-steps simulated in the time that the filter takes for one sample
+FILTER_WORK = 4.0  # samples times sub-steps of Stribeck friction that are simulated in the time that the filter takes for one sample
 
 Others = Sequence[tuple[str, tuple[float, ...]]]
 
@@ -73,7 +73,7 @@ def filter_fit(
             limits=replace(limits, bar=None if limits.bar is None else limits.bar / data.sampling_rate),
         )
     )
-    data.work.add(FILTER_WORK * found.runs * data.first)
+    data.work.add(FILTER_WORK * found.filtered)
     return _result(data, library, effect, [name for name, _ in others], found), found
 
 

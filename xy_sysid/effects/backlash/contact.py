@@ -99,6 +99,7 @@ class Contact:
             without=(innovation if without is None else without) * task.noise,
             noise=task.noise,
             runs=fit.runs,
+            filtered=fit.filtered,
             process_noise_factor=process_noise_factor,
             too_small=not large,
             given_up=spread is None,

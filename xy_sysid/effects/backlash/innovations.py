@@ -59,7 +59,7 @@ class Innovations:
         self, sampling_rate: float, base: tuple[float, float, float], noise: float, companions: Companions, laws: tuple[Effect, ...]
     ) -> None:
         self.fs, self.noise, self.companions, self.laws = sampling_rate, noise, companions, laws
-        self._ran: list[None] = []  # one item for each run of the filter, from any thread
+        self._ran: list[int] = []  # samples of each run of the filter, from any thread
         self.filter = filter_with(laws)
         rows = [row for effect in laws for row in _rows_of(effect)]
         self.friction = slice(len(NAMES), len(NAMES) + len(rows))
@@ -91,6 +91,11 @@ class Innovations:
     def runs(self) -> int:
         """Number of filter runs."""
         return len(self._ran)
+
+    @property
+    def filtered(self) -> int:
+        """Samples of all filter runs."""
+        return sum(self._ran)
 
     def inner(self, numbers: FloatArray) -> FloatArray:
         """Coordinates of numbers."""
@@ -166,8 +171,8 @@ class Innovations:
 
     def run(self, numbers: FloatArray, view: View, sloped: bool) -> tuple[FloatArray, FloatArray]:
         """(n,) innovations over the encoder noise, and (n, coordinates) their derivatives, or (0, 0) unless ``sloped``."""
-        self._ran.append(None)
         n = view.samples
+        self._ran.append(n)
         voltage, position, against, through = self._undone(numbers, n)
         column = np.zeros(0, dtype=np.int64)
         moved = np.zeros((0, n)), np.zeros((0, n + 1)), np.zeros((0, 2, n))
