@@ -204,7 +204,8 @@ def _axis(case: Foreign) -> tuple[float, FloatArray, FloatArray, Units]:
         else:
             gap = max(8.0 * count, float(random.uniform(3.0, 12.0)) * 0.25 * speed / rate)  # wider than the typical motion in a sample
             omega = 2.0 * math.pi * float(np.exp(random.uniform(math.log(300.0), math.log(900.0))))
-            joint = f'limited="true" range="{-0.5 * gap} {0.5 * gap}" solreflimit="{-(omega**2)} {-2.0 * float(random.uniform(0.05, 0.4)) * omega}"'
+            half = math.degrees(0.5 * gap)  # the unit of a range, unlike that of an angle
+            joint = f'limited="true" range="{-half} {half}" solreflimit="{-(omega**2)} {-2.0 * float(random.uniform(0.05, 0.4)) * omega}"'
             joint += ' solimplimit="0.95 0.95 1e-9"'
         words["behind"] = LOAD.format(joint=joint, inertia=far)
     elif case.kind == "load":
