@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING
 import pytest
 from _pytest.faulthandler import fault_handler_stderr_fd_key
 
+from xy_sysid.processes.memory import keep_freed_memory
+
 if TYPE_CHECKING:
     from helpers.ros_tools import World
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):  # as commands and nodes set it: reproducible bit for bit, and faster
     os.environ.setdefault(_name, "1")
+
+keep_freed_memory()  # as commands do
 
 os.environ.setdefault("COLUMNS", "400")  # commands break lines at a terminal's width; a test finds a sentence in one line
 
