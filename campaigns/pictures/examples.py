@@ -61,7 +61,7 @@ EXAMPLES = (
         "coulomb_friction",
         (FREQUENCY, SPEED, ZOOM),
         "The mean error against velocity jumps at standstill. At low speed the axis is slower than the model in both directions. At high "
-        "speed it is faster, because the fit made the rigid model too weak to compensate for the friction. By frequency the error is flat "
+        "speed it is faster, because the fit compensated for the friction: it made the rigid model too weak. By frequency the error is flat "
         "up to the pole of the axis, because the sign of the velocity contains all frequencies.",
     ),
     Example(
@@ -97,8 +97,8 @@ EXAMPLES = (
     Example(
         "constant_load",
         (FREQUENCY, SPEED, TIME),
-        "The mean error is the same at every velocity and time, and there is no error by frequency, because a constant has none: weight, a "
-        "preloaded spring, an offset of the amplifier.",
+        "The mean error is the same at every velocity and time. There is no error by frequency, because a constant force acts at 0 Hz only. "
+        "Examples are a weight, a preloaded spring and an offset of the amplifier.",
     ),
     Example(
         "dead_zone",
@@ -115,8 +115,8 @@ EXAMPLES = (
     Example(
         "amplifier_lag",
         (FREQUENCY, BODE, ZOOM),
-        "No error at the lowest frequencies, and an increasing error above. At the dip, the fitted delay has the same phase as the lag. The "
-        "measured magnitude bends down above 100 Hz, which a delay cannot do.",
+        "No error at the lowest frequencies, and an increasing error above. At the dip of the error, the fitted delay has the same phase as "
+        "the lag. The measured magnitude bends down above 100 Hz, which a delay cannot do.",
     ),
     Example(
         "backlash",
@@ -132,8 +132,8 @@ EXAMPLES = (
     Example(
         "lead_error",
         (FREQUENCY, PLACE, SPEED),
-        "The size of the error is a wave along the travel, with zero mean, and it grows with speed. The scale of the encoder depends on the "
-        "position; no force is missing.",
+        "The size of the error is a wave along the travel and grows with speed. The mean error is zero. The scale of the encoder depends on "
+        "the position; no force is missing.",
     ),
     Example(
         "position_dependent_gain",
@@ -156,7 +156,7 @@ EXAMPLES = (
         "hardening_stiffness",
         (FREQUENCY, PLACE, TIME),
         "The mean error bends at both ends of the travel, against the motion: a stiffening spring. Over a short travel it looks like a "
-        "straight line; here it is large (`cubic` 1e6 V/m3).",
+        "straight line, so the effect is made large here (`cubic` 1e6 V/m3).",
         "1e6",
     ),
     Example(
@@ -168,8 +168,8 @@ EXAMPLES = (
     Example(
         "gravity",
         (FREQUENCY, PLACE, SPEED),
-        "A rotary joint; 1000 mm stand for 1 rad. The mean error is part of a sine: steep where the arm hangs, flat where it is level. Over "
-        "a tenth of a turn a spring with a load looks the same.",
+        "A rotary joint; in the pictures 1000 mm stand for 1 rad. The mean error is part of a sine: steep where the arm hangs, flat where it "
+        "is level. Over a tenth of a turn a spring with a load looks the same.",
         machine="joint.yaml",
         excite=(
             ("rms", 6.0),
