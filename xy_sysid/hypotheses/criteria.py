@@ -38,20 +38,20 @@ _number = TABLE.number
 PRICE = _number("price", 4.0, "nats", "cost of a parameter: half the logarithm of the number of independent lines (Schwarz 1978)")
 CHANCE = _number("chance", 0.977, "1", "least probability that a held-out gain is real: two standard errors")
 OVERLAP = _number("overlap", 1.5, "windows", "half-overlapping Hann windows per independent window (Welch 1967)")
-WHITE = _number("white", 0.01, "1", "probability that white noise on the input is taken for a missing effect")
+WHITE = _number("white", 0.01, "1", "accepted risk of taking white noise on the input for a missing effect")
 DOUBTFUL = _number("doubtful", 0.1, "1", "a rival is mentioned if it predicts as well with at least this probability")
 SIZE = _number("size", 0.7, "1", "least size of an effect; an unmodelled force could imitate a smaller one")
 RICHER = _number("richer", 0.25, "1", "least size of a richer law compared with the simpler one that it replaces")
-WIDTH = _number("width", 6, "moves", "most swaps, and most pairs, from one set; the true one was among the first four")
+WIDTH = _number("width", 6, "moves", "most replacements, and most pairs, from one set; the true one was among the first four")
 ALMOST = _number(
-    "almost", 0.7, "1", "ratio above which two gains or sizes are almost equal: dry friction is then named first, a pair promises no more"
+    "almost", 0.7, "1", "two gains or sizes of a higher ratio count as equal: dry friction is named first, and a pair adds nothing"
 )
 OPTIMISM = _number("optimism", 3.0, "1", "a fit gains at most this multiple of its first-order prediction")
-HOPELESS = _number("hopeless", 1.5, "nats a line", "a screening fit this far behind after one round stops; none came near the best")
-NEAR = _number("near", 0.03, "1", "a set whose screening fit is within this part of the best gain is fitted to all data")
+HOPELESS = _number("hopeless", 1.5, "nats a line", "a fit to part of the data stops if it is this far behind after one round; no such fit came near the best")
+NEAR = _number("near", 0.03, "1", "a set whose score on part of the data is within this part of the best gain is fitted to all data")
 AT_FLOOR = _number("at the floor", 0.2, "nats a line", "below this the error is noise; clean axes have 0.03, the weakest effects 1")
 LEAST = _number("least one step ahead", 0.03, "nats", "least gain in log error power; repeated fits agree within 0.02")
-OPTIMISM_AHEAD = _number("optimism one step ahead", 5.0, "1", "with backlash, the same for gains one step ahead")
+OPTIMISM_AHEAD = _number("optimism one step ahead", 5.0, "1", "optimism for gains one step ahead, with backlash")
 ALIKE = _number("alike one step ahead", 0.7, "1", "with backlash, effects that promise this part of the best gain are fitted")
 TELLS = _number("tells", 0.15, "nats", "least gain of backlash in log error power; filters otherwise differ by less")
 FILTERED = (1.0 + SIZE) ** -0.5  # innovation of a filter over that of the best simulation with an autoregressive error: the same size
