@@ -146,17 +146,16 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
     return _belief(evidence, model, draws, scale, precision)
 
 
-def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
+def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, count: int) -> Belief | None:
     """The belief in a model that explains the data and an effect that the data do not show, with usual sizes that the data allow.
 
     The new effect replaces one of its family, and parameters of the same name keep their values. None if the data allow no such size.
-    best: nats of the model that explains the data best; draws: number of draws, and their seed
+    best: nats of the model that explains the data best; count: number of draws
     """
-    count, seed = draws
     found: list[AxisModel] = []
     shared = _shared(rest, name)
     own = {key for key in rest.library[name].names if key not in shared}
-    for drawn in _usual(evidence, rest, name, TRIES * count, seed):
+    for drawn in _usual(evidence, rest, name, TRIES * count):
         model = _settled(evidence, drawn, {f"{name}.{key}" for key in own})
         if evidence.valid(model) and evidence.nats(model) - best < ALLOWED:
             found.append(model)
@@ -198,8 +197,8 @@ def _shared(model: AxisModel, name: str) -> dict[str, float]:
     return {key: known[key] for key in model.library[name].names if key in known}
 
 
-def _usual(evidence: Evidence, rest: AxisModel, name: str, count: int, seed: int) -> Iterator[AxisModel]:
-    random, data = np.random.default_rng([seed, 1]), evidence.data
+def _usual(evidence: Evidence, rest: AxisModel, name: str, count: int) -> Iterator[AxisModel]:
+    random, data = np.random.default_rng([0, 1]), evidence.data
     both = [np.concatenate((signal, -signal)) for signal in (data.voltage, data.velocity)]  # an offset is a part of the size
     moved, shared = rest.library[name].on(Similarity.of(data.sampling_rate, *both)), _shared(rest, name)
     items = [item if item.positive else over for item, over in zip(moved, evidence.sizes(rest.library[name]), strict=True)]

@@ -24,7 +24,7 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
     scale, unit = readable(document["units"]["output"])
     lift = 20 * np.log10(scale)
     frequency, trusted = row(measured["frequency"]), np.array(measured["trusted"], dtype=bool)
-    pieces, seen = stretches(trusted), _between(trusted)
+    pieces, seen = stretches(trusted), between(trusted)
     figure = drawing([0.58, 0.42], 420, mode)
     curves = (
         (1, "magnitude_db", "magnitude_low_db", "magnitude_high_db", lift),
@@ -124,7 +124,7 @@ def stretches(trusted: np.ndarray) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _between(trusted: np.ndarray) -> slice:
+def between(trusted: np.ndarray) -> slice:
     """The slice from the first to the last trusted line. Outside it the input has no power and a simulated response means nothing."""
     found = np.flatnonzero(trusted)
     return slice(int(found[0]), int(found[-1]) + 1) if found.size else slice(None)
