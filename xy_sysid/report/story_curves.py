@@ -49,8 +49,8 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
                 x=frequency[~trusted], y=values[~trusted], mode="markers", marker=grey(), name="not trusted", legendgroup="not",
                 showlegend=first, row=at, col=1,
             )  # fmt: skip
-    _range(figure, 1, [(row(measured["magnitude_db"]) + lift)[seen], (row(model["magnitude_db"]) + lift)[seen]])
-    _range(figure, 2, [row(measured["phase_deg"])[seen], row(model["phase_deg"])[seen]])
+    fit_range(figure, 1, [(row(measured["magnitude_db"]) + lift)[seen], (row(model["magnitude_db"]) + lift)[seen]])
+    fit_range(figure, 2, [row(measured["phase_deg"])[seen], row(model["phase_deg"])[seen]])
     figure.update_yaxes(title_text=f"dB re 1 {plain(over(unit, document['units']['input']))}", row=1, col=1)
     figure.update_yaxes(title_text="phase (°)", dtick=turns([row(measured["phase_deg"])[seen]]), row=2, col=1)
     frequency_axis(figure, 2, [frequency])
@@ -130,7 +130,8 @@ def between(trusted: np.ndarray) -> slice:
     return slice(int(found[0]), int(found[-1]) + 1) if found.size else slice(None)
 
 
-def _range(figure: go.Figure, at: int, curves: list[FloatArray]) -> None:
+def fit_range(figure: go.Figure, at: int, curves: list[FloatArray]) -> None:
+    """Fit the range of a y axis to the finite values of these curves, with room at both ends."""
     values = np.concatenate([item[np.isfinite(item)] for item in curves])
     if values.size:
         room = max(0.06 * float(np.ptp(values)), 1.0)
