@@ -71,14 +71,14 @@ def floor_line(figure: go.Figure, at: int = 1, label: str = "noise floor") -> No
     )  # fmt: skip
 
 
-def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0, at: int = 1) -> None:
+def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0) -> None:
     """Shade failing places and label the first NAMED with their size, each on its own line; ends: of the axis, in the document's unit."""
     low, high = ends
     for level, item in enumerate(places):
         first, last = max(float(item["from"]), low), min(float(item["to"]), high)
         if not last >= first:
             continue
-        stretches(figure, [(first * scale, last * scale)], fade(FAILS, 0.13), row=at, line={"color": fade(FAILS, 0.5), "width": 1})
+        stretches(figure, [(first * scale, last * scale)], fade(FAILS, 0.13), row=1, line={"color": fade(FAILS, 0.5), "width": 1})
         if level >= NAMED:
             continue
         middle = np.log10(np.sqrt(first * last) * scale) if log else 0.5 * (first + last) * scale
@@ -87,7 +87,7 @@ def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float,
         anchor = "left" if where < 0.25 else "right" if where > 0.75 else "center"
         text = f"fails: {number(float(item['error_over_floor']), 3)} × floor"
         figure.add_annotation(
-            text=text, x=float(middle), xref=_axis("x", at), y=1, yref=f"{_axis('y', at)} domain",
+            text=text, x=float(middle), xref="x", y=1, yref="y domain",
             yanchor="top", yshift=-LINE * level, xanchor=anchor, showarrow=False, font={"color": FAILS, "size": 11},
             hovertext=str(item["sentence"]),
         )  # fmt: skip
@@ -128,9 +128,9 @@ def shade_held_out(figure: go.Figure, document: Document, shown: Document, at: t
         )
 
 
-def grey(size: int = 4) -> dict[str, Any]:
+def grey() -> dict[str, Any]:
     """Marker style of untrusted values."""
-    return {"color": fade(UNTRUSTED, 0.75), "size": size, "symbol": "x-thin", "line": {"width": 1, "color": fade(UNTRUSTED, 0.75)}}
+    return {"color": fade(UNTRUSTED, 0.75), "size": 4, "symbol": "x-thin", "line": {"width": 1, "color": fade(UNTRUSTED, 0.75)}}
 
 
 def _axis(letter: str, number: int) -> str:

@@ -36,10 +36,10 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
     return f"{number(value * scale, digits)} {shown}".rstrip()
 
 
-def moved(value: float, unit: str, digits: int = 4) -> str:
+def moved(value: float, unit: str) -> str:
     """A motion or speed in its display unit."""
     scale, shown = motion(unit)
-    return f"{number(value * scale, digits)} {shown}"
+    return f"{number(value * scale, 3)} {shown}"
 
 
 def possible(name: str, figures: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -88,8 +88,8 @@ def estimate_text(item: Interval) -> str:
     return interval_text(item.value, item.low, item.high, item.unit, item.name)
 
 
-def root(value: complex, digits: int = 4) -> str:
+def root(value: complex) -> str:
     """One root, or a conjugate pair as a ± bj."""
     if value.imag == 0:
-        return number(value.real, digits)
-    return f"{number(value.real, digits)} ± {number(abs(value.imag), digits)}j"
+        return number(value.real, 4)
+    return f"{number(value.real, 4)} ± {number(abs(value.imag), 4)}j"
