@@ -10,7 +10,7 @@ An effect that is not visible in the data keeps its usual size, if the data allo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,16 +100,24 @@ class Evidence:
 
     def whitened(self, model: AxisModel, scale: Scale) -> tuple[FloatArray, FloatArray]:
         """(k, m) derivatives of the error by the coordinates, and (m,) the error, both divided by its expected size."""
-        error, inner = self.error(model), scale.inner(model.row)
+        error = self.error(model)
         spectrum, _, _ = self.spectrum(error)
         weight = ((self.objective.lines > 0.0) / np.sqrt(spectrum))[self.data.layout.band]
-        rows = []
-        for k in range(inner.size):
-            step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
-            moved = inner.copy()
-            moved[k] += step
-            rows.append(((self.error(with_row(model, scale.outer(moved))) - error) / step * weight).ravel().view(np.float64))
-        return np.nan_to_num(np.array(rows)), np.nan_to_num((error * weight).ravel().view(np.float64))
+        rows = derivatives(self.error, model, scale, error) * weight
+        return np.nan_to_num(rows.reshape(len(rows), -1).view(np.float64)), np.nan_to_num((error * weight).ravel().view(np.float64))
+
+
+def derivatives(
+    of: Callable[[AxisModel], NDArray[np.complex128]], model: AxisModel, scale: Scale, now: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """(k, windows, lines) derivatives of a spectrum of a model by the coordinates of the scale; now: (windows, lines) the spectrum itself."""
+    inner, found = scale.inner(model.row), []
+    for k in range(inner.size):
+        step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
+        moved = inner.copy()
+        moved[k] += step
+        found.append((of(with_row(model, scale.outer(moved))) - now) / step)
+    return np.array(found)
 
 
 def with_row(model: AxisModel, row: FloatArray) -> AxisModel:
