@@ -92,7 +92,8 @@ def poles_zeros(document: Document, step: int | None = None, mode: str = "light"
     figure = drawing([1.0], 260, mode)
     edge = 1.0
     for name, symbol, colour in (("poles", "x-thin", MODEL), ("zeros", "circle-open", MEASURED)):
-        roots = [(float(item["real"]), sign * float(item["imag"]), item) for item in shown["pictures"]["linear"][name] for sign in _signs(item)]
+        stored = [(item, sign) for item in shown["pictures"]["linear"][name] for sign in ((1, -1) if item["imag"] else (1,))]  # a pair is stored once
+        roots = [(float(item["real"]), sign * float(item["imag"]), item) for item, sign in stored]
         if not roots:
             continue
         edge = max(edge, *(abs(value) for x, y, _ in roots for value in (x, y)))
@@ -111,11 +112,6 @@ def poles_zeros(document: Document, step: int | None = None, mode: str = "light"
     figure.update_xaxes(title_text="real (rad/s)", range=[1.15 * left - 0.05 * edge, max(1.3 * right, 0.12 * edge)], row=1, col=1)
     figure.update_yaxes(title_text="imaginary (rad/s)", range=[-1.15 * edge, 1.15 * edge], row=1, col=1)
     return figure
-
-
-def _signs(root: dict[str, float]) -> tuple[int, ...]:
-    """Signs of the imaginary part to draw: both for a pair, which is stored once."""
-    return (1, -1) if abs(root["imag"]) > 0 else (1,)
 
 
 def stretches(trusted: np.ndarray) -> list[slice]:

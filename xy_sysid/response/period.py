@@ -45,7 +45,7 @@ def find_half_period(u: FloatArray) -> int | None:
     if alike.size == 0:
         return None
     half = int(np.argmin(alike[SHORTEST:])) + SHORTEST
-    tones = _odd_lines(signal[:half])
+    tones = np.abs(scipy.fft.rfft(np.concatenate((signal[:half], -signal[:half]))))[1::2]  # odd lines of the whole period
     several = int(np.sum(tones > TONE * tones.max())) >= TONES
     return half if several and likeness(signal, half) < -LIKENESS else None
 
@@ -87,11 +87,6 @@ def half_periods(u: FloatArray, y: FloatArray, half: int, differenced: bool) -> 
         inputs, moved = np.concatenate((u[rows], -u[rows], u[rows][:1])), np.concatenate((steps[rows], -steps[rows]))
         pieces.append((2 * half * number, inputs, np.concatenate(([0.0], np.cumsum(moved)))))
     return pieces
-
-
-def _odd_lines(part: FloatArray) -> FloatArray:
-    """Magnitudes of the odd lines of the period that consists of this part (n,) and its negative."""
-    return np.asarray(np.abs(scipy.fft.rfft(np.concatenate((part, -part))))[1::2])
 
 
 def _whole(signal: FloatArray, period: int) -> bool:
