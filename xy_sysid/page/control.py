@@ -93,7 +93,7 @@ class Control:
         self._recording()
         if not self._speed and "excitation" in heard.present and session.link is not None:
             self._speed = 1.0
-            session.link.get_parameters("excitation", ["speed"], self._paced, lambda done, words: None)
+            session.link.get_parameters("excitation", ["speed"], self._paced)
         waits = not begun and state in ("unconfigured", "inactive")
         if (waits, state) != self._filled:
             self._filled = waits, state
