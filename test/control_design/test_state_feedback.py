@@ -15,8 +15,8 @@ from helpers.known_models import DELAY, axis, known
 from xy_sysid.control_design.closed_loop import Encoder, follow_path
 from xy_sysid.control_design.feedback import Asked, feedback, within_a_gap
 from xy_sysid.control_design.path import Bounds, s_curve
-from xy_sysid.control_design.sampled import sampled
-from xy_sysid.control_design.state_feedback import StateFeedback, closed_loop, state_feedback
+from xy_sysid.control_design.sampled import looped, sampled
+from xy_sysid.control_design.state_feedback import StateFeedback, state_feedback
 from xy_sysid.control_design.state_text import source
 from xy_sysid.control_design.uncertain import samples
 from xy_sysid.errors import BadInput
@@ -35,7 +35,7 @@ def test_the_margins_hold_for_samples_that_were_not_designed_for(rigid: StateFee
     own = rigid.response(frequency)
     for item in samples(known(), 100)[30:]:
         system = sampled(item, RATE)
-        assert np.max(np.abs(np.linalg.eigvals(closed_loop(system, rigid.a, rigid.b, rigid.c)))) < 1.0
+        assert np.max(np.abs(np.linalg.eigvals(looped(system, (rigid.a, rigid.b, rigid.c, 0.0))))) < 1.0
         loop = system.response(frequency) * own
         assert np.min(np.abs(1.0 + loop)) > 0.45
 
@@ -117,4 +117,4 @@ def test_a_loop_across_an_open_gap_is_stable_with_the_motor_alone() -> None:
     assert found.bandwidth <= state_feedback(known(), RATE).bandwidth
     assert 2.0 <= found.worst.gain < 0.7 * found.nominal.gain  # the motor alone limits it
     (motor,) = within_a_gap(model.model)
-    assert np.max(np.abs(np.linalg.eigvals(closed_loop(sampled(motor, RATE), found.a, found.b, found.c)))) < 1.0
+    assert np.max(np.abs(np.linalg.eigvals(looped(sampled(motor, RATE), (found.a, found.b, found.c, 0.0))))) < 1.0

@@ -44,7 +44,7 @@ def test_a_table_that_nobody_described_stays_within_its_limits(found: NextExperi
 
 def test_an_axis_that_its_friction_holds_may_carry_a_load() -> None:
     """A load to either side: the axis drifts during the experiment, but stays within the travel."""
-    loads = [dict(model.effects)["constant_load"][0] / dict(model.effects)["coulomb_friction"][0] for model in _draws(LIMITS, 1)]
+    loads = [dict(model.effects)["constant_load"][0] / dict(model.effects)["coulomb_friction"][0] for model in _draws(LIMITS)]
     assert min(loads) < -0.3 and max(loads) > 0.3 and max(map(abs, loads)) <= 1.0
 
 

@@ -48,7 +48,7 @@ def test_tiles_and_compare_have_the_floor_of_the_ladder(story: dict[str, Any], r
     """The tile shows this number, and compare finds it within 2 % from its part of the data."""
     floor = story["ladder"][0]["noise_floor"]
     (tile,) = [fact for fact in story_facts(story) if fact.label == "noise floor"]
-    assert tile.text == moved(floor, "m/s", 3)
+    assert tile.text == moved(floor, "m/s")
     assert xy.compare(run).noise_floor == pytest.approx(floor, rel=0.02)
 
 
@@ -62,7 +62,7 @@ def test_commands_report_and_page_say_the_floor_of_the_ladder(story: dict[str, A
     assert [diagnosed["error"]["noise_floor"], *(rung["noise_floor"] for rung in refined["ladder"])] == pytest.approx([floor] * 3, rel=1e-9)
     table = cli("refine", tmp_path / "rec.npz", "--axis", "x", "--add", "constant_load").out
     assert f"floor {1e3 * floor:.4g}" in table
-    assert f"the noise floor is {moved(floor, 'm/s', 3)}" in size(story, 1.0)
+    assert f"the noise floor is {moved(floor, 'm/s')}" in size(story, 1.0)
 
 
 def test_what_is_held_out_is_shaded_where_it_lies(story: dict[str, Any]) -> None:

@@ -36,7 +36,8 @@ def run(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return _stopped()
     except (BrokenPipeError, ReaderGone):
-        return _nobody_reads()
+        _discard(sys.stdout)  # the reader of the pipe has closed it
+        return 0
     except OSError as problem:
         place = f"{problem.filename}: " if problem.filename else ""
         return _refuse(f"{place}{problem.strerror or problem}. Check the path, the permissions and the free disk space.")
@@ -108,12 +109,6 @@ def _say(line: str) -> None:
         sys.stderr.flush()
     except OSError:
         _discard(sys.stderr)
-
-
-def _nobody_reads() -> int:
-    """Discard further output, because the reader of the pipe has closed it; the exit code is 0."""
-    _discard(sys.stdout)
-    return 0
 
 
 def _discard(stream: TextIO) -> None:

@@ -92,9 +92,8 @@ def _specs(table: Machine, machine: str, seconds: float, speed: float, seed: int
 
     from xy_sysid.processes.run_plan import plan
 
-    excite: dict[str, Any] = {"lockstep": True, "speed": float(speed), "duration": float(seconds), "block": BLOCK}
+    excite: dict[str, Any] = {"lockstep": True, "speed": float(speed), "duration": float(seconds), "block": BLOCK, "unit": table.spec.unit}
     unit = {"output_unit": table.spec.unit}
-    excite |= {"unit": table.spec.unit}
     excite |= {axis: {"seed": seed + k} for k, axis in enumerate(table.axes)}
     rigid = all(table.truth(axis)["resonance_hz"] is None for axis in table.axes)
     orders = {"numerator_order": 0, "denominator_order": 2} if rigid else {"numerator_order": 2, "denominator_order": 4}

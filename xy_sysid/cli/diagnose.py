@@ -50,7 +50,10 @@ def diagnose(
     found, refused = each(names, lambda name: logic(runs_of(recordings, name), known, limit, time.process_time), "diagnosing ")
     seconds = time.perf_counter() - begun
     if json:
-        answers: dict[str, Any] = {name: answer_document(item) | _mechanics(item, drive) for name, item in found.items()}
+        answers: dict[str, Any] = {}
+        for name, item in found.items():
+            mechanics = mechanics_document(item.told.parameters if item.told else (), item.units, drive)
+            answers[name] = answer_document(item) | {"mechanics": mechanics}
         answers |= {name: {"verdict": "not_enough_data", "effect": None, "confidence": 1.0, "sentence": text} for name, text in refused.items()}
         emit({"axes": answers, "seconds": seconds, "notes": notes_of(recordings, names)})
         return
@@ -59,10 +62,6 @@ def diagnose(
     for text in (text for one in recordings for text in one.left_out(names)):
         say(text)
     say_refused(refused)
-
-
-def _mechanics(item: Answer, drive: Transmission) -> dict[str, Any]:
-    return {"mechanics": mechanics_document(item.told.parameters if item.told else (), item.units, drive)}
 
 
 def _show(name: str, item: Answer, drive: Transmission) -> None:

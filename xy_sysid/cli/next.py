@@ -22,7 +22,6 @@ from xy_sysid.units import Units, readable
 if TYPE_CHECKING:
     from xy_sysid.axis.model import Library
     from xy_sysid.diagnosis.answer import Answer
-    from xy_sysid.experiment_design.limits import MachineLimits
     from xy_sysid.experiment_design.of_run import NextExperiment
     from xy_sysid.imports.reading import Reading
     from xy_sysid.samples.recording import Run
@@ -81,6 +80,7 @@ def next_(
 ) -> None:
     """Design the next experiment within the limits of the machine: it distinguishes the effects that the recordings do not."""
     from xy_sysid.diagnosis.of_run import diagnose
+    from xy_sysid.experiment_design.limits import as_recorded
     from xy_sysid.experiment_design.of_run import next_experiment, sharpen
     from xy_sysid.experiment_design.rivals import check
     from xy_sysid.files.effects import library
@@ -95,10 +95,9 @@ def next_(
             )
         o.output_file("--trajectory", trajectory, force)
         o.output_file("--trajectory", trajectory.with_suffix(".csv"), force)
-    asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration)
+    asked = partial(_asked, voltage=voltage, travel=travel, speed=speed, acceleration=acceleration, rms=rms)
     if precision == NOTHING:
-        unknown = _first(reading, run_file, asked, rms, seconds)
-        _answered(unknown, output, json, [])
+        _answered(_first(reading, run_file, asked, seconds), output, json, [])
         return
     if not recs:
         raise BadInput("REC", "missing", "recordings, or --for nothing", "Give a recording of the axis.")
@@ -112,7 +111,7 @@ def next_(
     if len(names) > 1:
         raise BadInput("--axis", "several axes", f"one of {', '.join(names)}", "An experiment is for one axis: add --axis.")
     runs = runs_of(recordings, names[0])
-    limits = _limits(runs, _own_limits(run_file, names[0]), asked(runs[0].units.output), rms, seconds)
+    limits = as_recorded(runs, **{**_own_limits(run_file, names[0]), **asked(runs[0].units.output), "seconds": seconds})
     with progress() as bar:
         task = bar.add_task(f"diagnosing axis {names[0]}", total=1.0)
         found = diagnose(runs, known, math.inf if budget is None else budget, time.process_time)
@@ -174,7 +173,7 @@ def _answered(answer: NextExperiment, output: Path | None, json: bool, notes: li
     _show(answer, output)
 
 
-def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[str, Any]], rms: float | None, seconds: float) -> NextExperiment:
+def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[str, Any]], seconds: float) -> NextExperiment:
     """The first experiment for an unknown axis, with the limits of a run file or of the options."""
     from xy_sysid.experiment_design.first import first_experiment
     from xy_sysid.experiment_design.limits import MachineLimits
@@ -183,7 +182,7 @@ def _first(reading: Reading, run_file: Path | None, asked: Callable[[str], dict[
     told, settings = _settings(run_file, axis)
     of = {name: reading.units.get(f"{axis}.{name}", reading.units.get(name)) for name in ("input", "output")}
     units = Units(of["input"] or settings.units.input, of["output"] or settings.units.output)
-    values = {**_own_limits(run_file, axis), **asked(units.output), **({} if rms is None else {"rms": rms})}
+    values = {**_own_limits(run_file, axis), **asked(units.output)}
     for name in ("voltage", "travel"):
         if name not in values:
             raise BadInput(
@@ -228,7 +227,7 @@ def sets_of(between: list[str] | None) -> list[tuple[str, ...]]:
     return [() if words == "rigid" else tuple(word.strip() for word in words.split("+")) for words in between]
 
 
-def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, acceleration: float | None) -> dict[str, Any]:
+def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, acceleration: float | None, rms: float | None) -> dict[str, Any]:
     """MachineLimits by name, SI, from the options."""
     scale = readable(unit)[0]
     asked: dict[str, Any] = {}
@@ -242,7 +241,8 @@ def _asked(unit: str, voltage: float | None, travel: str, speed: float | None, a
             raise BadInput("--travel", repr(travel), "LOW:HIGH", "Write for example --travel -140:140.")
     if speed is not None:
         asked["speed"] = speed / scale
-    return asked | {name: value for name, value in (("voltage", voltage), ("acceleration", acceleration)) if value is not None}
+    others = {"voltage": voltage, "acceleration": acceleration, "rms": rms}
+    return asked | {name: value for name, value in others.items() if value is not None}
 
 
 def _settings(run_file: Path | None, axis: str) -> tuple[Mapping[str, Any], ExcitationSettings]:
@@ -265,9 +265,3 @@ def _own_limits(run_file: Path | None, axis: str) -> dict[str, Any]:
     said = {"voltage": ("limit",), "travel": ("travel_min", "travel_max")}  # a default is not a limit that the user has set
     unsaid = {name for name, knobs_of in said.items() if any(f"{axis}.{one}" not in told for one in knobs_of)}
     return {name: value for name, value in of_settings(settings, axis).items() if name not in unsaid}
-
-
-def _limits(runs: tuple[Run, ...], own: Mapping[str, Any], asked: Mapping[str, Any], rms: float | None, seconds: float) -> MachineLimits:
-    from xy_sysid.experiment_design.limits import as_recorded
-
-    return as_recorded(runs, **{**own, **asked, **({} if rms is None else {"rms": rms}), "seconds": seconds})

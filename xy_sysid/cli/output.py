@@ -22,7 +22,7 @@ from xy_sysid.processes.terminal import printable
 from xy_sysid.units import readable
 
 if TYPE_CHECKING:
-    from xy_sysid.fitting.result import Interval
+    from xy_sysid.axis.mechanics import Figure
 
 
 PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
@@ -104,10 +104,10 @@ def table(title: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> 
     people.print(made)
 
 
-def estimates(title: str, items: Iterable[Interval]) -> None:
-    """Print values with their 95 % intervals, in display units."""
+def estimates(title: str, items: Iterable[Figure], head: str = "parameter") -> None:
+    """Print values with their 95 % intervals, in display units; head: of the column of names."""
     rows = [estimate(item.name, (item.value, item.low, item.high), item.unit) for item in items]
-    table(title, ("parameter", "value", "95 % interval", "unit"), rows)
+    table(title, (head, "value", "95 % interval", "unit"), rows)
 
 
 def estimate(name: str, figures: tuple[float, float, float], unit: str) -> tuple[str, str, str, str]:

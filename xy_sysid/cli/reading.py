@@ -18,6 +18,7 @@ from xy_sysid.samples.recording import Recording, Run
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
     from xy_sysid.response.frf import FrequencyResponse
+    from xy_sysid.samples.block import Block
 
 Found = TypeVar("Found")
 Command = Callable[..., None]
@@ -159,7 +160,7 @@ def named(paths: Sequence[Path]) -> str:
     return ", ".join(map(str, paths))
 
 
-def chosen(recording: Recording, axes: Sequence[str] | None) -> tuple[str, ...]:
+def chosen(recording: Recording | Block, axes: Sequence[str] | None) -> tuple[str, ...]:
     """The requested axes, or all; raises BadInput for an unknown one."""
     for name in axes or []:
         if name not in recording.axes:

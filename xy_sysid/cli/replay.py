@@ -11,6 +11,7 @@ import typer
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import aside, emit, estimates, progress, say, table
+from xy_sysid.cli.reading import chosen
 
 if TYPE_CHECKING:
     from xy_sysid.live.fitter import Update
@@ -42,7 +43,7 @@ def replay(
     from xy_sysid.bags import BagWriter
     from xy_sysid.bags.atomic import whole
     from xy_sysid.bags.streaming import Topics, stream_blocks
-    from xy_sysid.errors import BadInput, BadRecording
+    from xy_sysid.errors import BadRecording
     from xy_sysid.files.effects import library
     from xy_sysid.live.diagnoser import Diagnoser, all_at_once
     from xy_sysid.live.identifier import Identifier
@@ -84,10 +85,7 @@ def replay(
         kind, first = next(blocks, (None, None))
         if kind is None or first is None:
             raise BadRecording(bag, "holds no samples", "Give a bag with voltage and position.")
-        wished = tuple(axis or (name for name in o.axes_from(params) if name in first.axes)) or first.axes
-        for name in wished:
-            if name not in first.axes:
-                raise BadInput("--axis", repr(name), ", ".join(first.axes), "Choose one of these.")
+        wished = chosen(first, axis or [name for name in o.axes_from(params) if name in first.axes])
         if settings.units != USUAL:
             units[0] = settings.units
         identifier = Identifier(settings, wished, units[0])

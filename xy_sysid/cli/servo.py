@@ -8,7 +8,7 @@ import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.mechanics import Gear, mechanics_cells, mechanics_row
-from xy_sysid.cli.output import emit, estimate, say, say_refused, table
+from xy_sysid.cli.output import emit, estimates, say, say_refused, table
 from xy_sysid.cli.reading import chosen, each, notes_of, read_each, reads, stretches_of
 
 if TYPE_CHECKING:
@@ -54,8 +54,7 @@ def servo(recs: o.Recs, reading: Reading, inertia: Inertia = None, gear: Gear = 
     for name, item in found.items():
         first, *rest = servo_words(item, inertia)
         say(f"axis {name}: {first}", style="bold")
-        rows = [estimate(q.name, (q.value, q.low, q.high), q.unit) for q in item.quantities]
-        table("", ("over the inertia", "value", "95 % interval", "unit"), rows)
+        estimates("", item.quantities, "over the inertia")
         if inertia is not None:
             si = robot_parameters(item.quantities, item.units, inertia, gear)
             geared = ("at the motor",) if gear else ()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.mechanics import Gear, Kt, mechanics_document, mechanics_table
-from xy_sysid.cli.output import emit, estimate, say, say_refused, table
+from xy_sysid.cli.output import emit, estimates, say, say_refused
 from xy_sysid.cli.reading import chosen, each, notes_of, read_each, reads, stretches_of
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def steps(recs: o.Recs, reading: Reading, kt: Kt = None, gear: Gear = "", json: 
     for name, item in found.items():
         first, *rest = first_order_words(item)
         say(f"axis {name}: {first}", style="bold")
-        table("", ("parameter", "value", "95 % interval", "unit"), [estimate(q.name, (q.value, q.low, q.high), q.unit) for q in item.quantities])
+        estimates("", item.quantities)
         mechanics_table(item.quantities, units, drive)
         for sentence in rest:
             say(f"  {sentence}")

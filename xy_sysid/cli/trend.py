@@ -7,11 +7,12 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
-from xy_sysid.cli.output import emit, plain, progress, say, table
+from xy_sysid.cli.output import emit, progress, say, table
 from xy_sysid.cli.reading import reads
 
 if TYPE_CHECKING:
@@ -153,8 +154,8 @@ def _trend(one: Trend) -> dict[str, Any]:
         "unit": history.unit,
         "dates": [str(date) for date in history.dates],
         "values": history.value,
-        "ci95": plain([[low, high] for low, high in zip(one.low.tolist(), one.high.tolist(), strict=True)]),
-        "ci95_of_the_recording": plain([[low, high] for low, high in zip(history.low.tolist(), history.high.tolist(), strict=True)]),
+        "ci95": np.column_stack((one.low, one.high)),
+        "ci95_of_the_recording": np.column_stack((history.low, history.high)),
         "spread_between_recordings": one.spread,
         "next_ci95": list(one.next),
         "changed": bool(one.moved),

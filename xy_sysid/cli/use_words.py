@@ -11,6 +11,7 @@ from xy_sysid.control_design.bandwidth import Cost
 from xy_sysid.control_design.compensation import SIMPLE, left_words
 from xy_sysid.control_design.feedback import Feedback
 from xy_sysid.control_design.filters import Swing
+from xy_sysid.control_design.limits import RESERVE
 from xy_sysid.control_design.sampled import coefficients
 from xy_sysid.control_design.use import Used
 from xy_sysid.control_design.worth import Tracking
@@ -69,7 +70,7 @@ def show(name: str, used: Used) -> None:
         f = used.fastest
         scale, unit = motion(units.output)
         speeds = f"{scale * f.bounds.speed:.3g} {unit}/s, {scale * f.bounds.acceleration:.4g} {unit}/s2"
-        kept = f"{100 * f.reserve:.0f} % of {used.limit:.4g} {units.input} kept ({used.limit_from})"
+        kept = f"{100 * RESERVE:.0f} % of {used.limit:.4g} {units.input} kept ({used.limit_from})"
         say(f"  Fastest S-curve over the travel with {kept}: {speeds}, {f.path.seconds:.3g} s.")
     if used.predicted is not None:
         p = used.predicted

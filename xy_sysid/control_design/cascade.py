@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.control_design.feedback import INTEGRAL, POSITION, STEPS, TURN, USUAL, Asked, Margins, first_kept, loop_systems, margins_of, sign_of
-from xy_sysid.control_design.sampled import LinearSystem, Sampled, grid, looped_poles, on_grid, response_of
+from xy_sysid.control_design.feedback import INTEGRAL, POSITION, STEPS, TURN, USUAL, Asked, Margins, first_kept, loop_systems, margins_with, sign_of
+from xy_sysid.control_design.sampled import LinearSystem, Sampled, response_of
 from xy_sysid.control_design.uncertain import later
 
 RATE, ESTIMATOR = 8000.0, 1000.0  # Hz of ODrive's loops; rad/s of its estimator, by default
@@ -45,12 +45,8 @@ def cascade(model: PhysicalModel, asked: Asked = USUAL, calculation: float = 1.0
     """
     systems = loop_systems(later(model, calculation / RATE), RATE)
     tried = (shaped(systems[0], TURN * crossover) for crossover in asked.tries(RATE, STEPS))
-
-    def margins(system: Sampled, own: tuple[float, float, float]) -> Margins:
-        parts = system_of(*own)
-        return margins_of(on_grid(system) * response_of(*parts, grid(system), RATE), grid(system), looped_poles(system, parts))
-
-    own, nominal, worst = first_kept("bandwidth under ODrive's encoder estimator", asked, systems, tried, margins)
+    what = "bandwidth under ODrive's encoder estimator"
+    own, nominal, worst = first_kept(what, asked, systems, tried, lambda system, item: margins_with(system, system_of(*item)))
     return Cascade(*own, nominal=nominal, worst=worst, count=len(systems))
 
 

@@ -7,15 +7,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design import fmu, snippets, state_text, to_c, to_matlab, to_python
 from xy_sysid.control_design.compensation import SIMPLE, left_words
 from xy_sysid.control_design.mjcf import mjcf
 from xy_sysid.control_design.program import Program, program
 from xy_sysid.control_design.sdf import sdf
+from xy_sysid.control_design.snippets import plain_name
 from xy_sysid.control_design.urdf import urdf
 from xy_sysid.control_design.use import Used
 from xy_sysid.errors import BadInput
 from xy_sysid.settings import unknown_name
+
+Losses = tuple[tuple[str, str], ...]  # (effect, loss) of each effect that a format cannot represent
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +74,6 @@ def _inverse_note(used: Used) -> str:
     return f"the feedforward undoes {', '.join(chosen.terms)}{left_words(chosen.left)}"
 
 
-def plain_name(axis: str) -> str:
-    """A name that is valid in every language."""
-    kept = "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in axis)
-    return f"axis_{kept}"
-
-
 def c_source(used: Used) -> Exported:
     """Simulation and feedforward in C."""
     of, name, title = _program(used)
@@ -115,10 +113,12 @@ def mujoco(used: Used) -> Exported:
     return Exported({f"{plain_name(used.axis)}.xml": made.text}, note)
 
 
-def robot(used: Used) -> Exported:
-    """URDF."""
-    text, lost = urdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
-    return Exported({f"{plain_name(used.axis)}.urdf": text}, _losses(lost))
+def _joint(kind: str, write: Callable[[AxisModel, tuple[float, float] | None, float, bool], tuple[str, Losses]]) -> Callable[[Used], Exported]:
+    def made(used: Used) -> Exported:
+        text, lost = write(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
+        return Exported({f"{plain_name(used.axis)}.{kind}": text}, _losses(lost))
+
+    return made
 
 
 def observer(used: Used) -> Exported:
@@ -136,12 +136,6 @@ def observer(used: Used) -> Exported:
     return Exported({f"{name}.c": text, f"{name}.py": module}, note)
 
 
-def gazebo(used: Used) -> Exported:
-    """SDF."""
-    text, lost = sdf(used.model.model, used.travel, used.limit, used.model.units.output == "rad")
-    return Exported({f"{plain_name(used.axis)}.sdf": text}, _losses(lost))
-
-
 def mock_up(used: Used) -> Exported:
     """FMU."""
     of, name, title = _program(used)
@@ -149,7 +143,7 @@ def mock_up(used: Used) -> Exported:
     return Exported(fmu.files(of, name, title, used.model.units), note, archive=f"{name}.fmu")
 
 
-def _losses(lost: tuple[tuple[str, str], ...]) -> str:
+def _losses(lost: Losses) -> str:
     return "lost: " + "; ".join(f"{name} ({why})" for name, why in lost) if lost else "nothing is lost"
 
 
@@ -160,8 +154,8 @@ TARGETS: dict[str, Callable[[Used], Exported]] = {
     "matlab": matlab_source,
     "fmu": mock_up,
     "mujoco": mujoco,
-    "urdf": robot,
-    "sdf": gazebo,
+    "urdf": _joint("urdf", urdf),
+    "sdf": _joint("sdf", sdf),
     "state_feedback": observer,
     **{name: _snippet(write) for name, write in snippets.TARGETS.items()},
 }

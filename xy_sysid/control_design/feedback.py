@@ -18,7 +18,18 @@ from numpy.typing import NDArray
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.closed_loop import NO_LIMIT, Controller, Encoder
-from xy_sysid.control_design.sampled import Sampled, closed_poles, controller_response, grid, noise_to_voltage, on_grid, sampled
+from xy_sysid.control_design.sampled import (
+    LinearSystem,
+    Sampled,
+    closed_poles,
+    controller_response,
+    grid,
+    looped_poles,
+    noise_to_voltage,
+    on_grid,
+    response_of,
+    sampled,
+)
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.errors import BadInput
 from xy_sysid.response.frf import ComplexArray
@@ -152,6 +163,12 @@ def margins(system: Sampled, controller: Controller) -> Margins:
     """Margins of the sampled loop."""
     loop = on_grid(system) * controller_response(controller, grid(system), system.sampling_rate)
     return margins_of(loop, grid(system), closed_poles(system, controller))
+
+
+def margins_with(system: Sampled, controller: LinearSystem) -> Margins:
+    """Margins of the sampled loop with any linear controller from error to voltage."""
+    own = response_of(*controller, grid(system), system.sampling_rate)
+    return margins_of(on_grid(system) * own, grid(system), looped_poles(system, controller))
 
 
 def margins_of(loop: ComplexArray, frequency: FloatArray, poles: ComplexArray) -> Margins:

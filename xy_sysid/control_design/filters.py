@@ -208,7 +208,7 @@ def rings_after(path: SampledPath, mode: Swing) -> float:
     return 0.5 * float(np.ptp(place[int(moving[-1]) + 1 if moving.size else 0 :]))
 
 
-def best_shaper(found: tuple[Shaper, ...], tolerated: float = TOLERATED) -> Shaper:
-    """The shortest shaper with at most ``tolerated`` residual vibration over the frequency's interval; else the one with the least."""
-    good = [item for item in found if item.worst <= tolerated]
+def best_shaper(found: tuple[Shaper, ...]) -> Shaper:
+    """The shortest shaper with at most ``TOLERATED`` residual vibration over the frequency's interval; else the one with the least."""
+    good = [item for item in found if item.worst <= TOLERATED]
     return min(good, key=lambda item: item.duration) if good else min(found, key=lambda item: item.worst)

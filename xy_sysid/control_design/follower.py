@@ -64,9 +64,7 @@ class Follower:
         self.plan = made
         size = max(length or 0, made.path.position.size)
         quiet = round(QUIET * made.path.sampling_rate)
-        begin = float(made.path.position[0])
-        way = self._approach(here, begin)
-        parts = [way]
+        parts = [self._approach(here, float(made.path.position[0]))]
         extras = [np.zeros(parts[0].size)]
         self._from: list[int] = []
         self._fresh: set[int] = set()

@@ -19,7 +19,7 @@ from xy_sysid.control_design.path import SampledPath
 from xy_sysid.control_design.uncertain import Derived, derive, is_determined, is_known_angle
 from xy_sysid.samples.block import FloatArray
 
-USUAL_SPEED = 1.0  # V of the steady state that defines the usual speed, by default
+USUAL_SPEED = 1.0  # V of the steady state at whose speed kS is taken
 ARM, ANGLE = "kCos", "zero"  # names of the gain of an arm, and of the angle at which it is level
 
 
@@ -49,9 +49,9 @@ class Gains:
         return f"0 stands for {', '.join(self.unsure)}, which the data do not determine" if self.unsure else ""
 
 
-def gains(model: PhysicalModel, speed: float | None = None) -> Gains:
-    """kS, kV, kA, and kG, kCos and values by direction if the model has them; speed: m/s, at which kS is taken (that of 1 V by default)."""
-    usual = abs(speed if speed is not None else USUAL_SPEED * model.model.gain)
+def gains(model: PhysicalModel) -> Gains:
+    """kS, kV, kA, and kG, kCos and values by direction if the model has them."""
+    usual = abs(USUAL_SPEED * model.model.gain)
     way = math.copysign(1.0, model.model.gain)
 
     def rubs(of: AxisModel, direction: float) -> float:

@@ -12,6 +12,7 @@ from xy_sysid.effects._binding import call
 
 X, V, Q = 0, 1, 2  # indices in a state: position, speed, attached masses
 NUMBERS = ("gain", "pole", "turn", "h_old", "h_new", "cuts_old", "cuts_new", "back_old", "back_new", "n", "ring", "shake")
+WHOLE_NUMBERS = frozenset({"cuts_old", "cuts_new", "back_old", "back_new", "n", "ring"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +45,7 @@ class StateLayout:
 
 def given_numbers() -> dict[str, str]:
     """The numbers of a loop that takes them as ``z``."""
-    whole = {"cuts_old", "cuts_new", "back_old", "back_new", "n", "ring"}
-    return {name: f"int(z[{place}])" if name in whole else f"z[{place}]" for place, name in enumerate(NUMBERS)}
+    return {name: f"int(z[{place}])" if name in WHOLE_NUMBERS else f"z[{place}]" for place, name in enumerate(NUMBERS)}
 
 
 class LawText:

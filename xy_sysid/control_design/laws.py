@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -107,6 +107,16 @@ def along(model: AxisModel, places: FloatArray, what: str) -> FloatArray:
     return np.array([kinds[what](float(x)) for x in places])
 
 
-def lost_in(language: str, effect: Effect) -> str:
-    """What a format that has only the mean level of dry friction keeps of an effect."""
-    return "only its mean level at speed is kept" if effect.is_dry else f"{language} cannot express it"
+def one_joint(model: AxisModel, limit: float) -> tuple[float, float, float]:
+    """Mass, V s2/m, largest effort and mean level of dry friction, V, of a joint; limit: of the drive, V, infinite if unknown."""
+    top = min(limit, largest_voltage(model))
+    level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
+    return 1.0 / (abs(model.gain) * model.pole), top if math.isfinite(top) else 1e3 / abs(model.gain), level
+
+
+def lost_in(language: str, model: AxisModel, effects: Iterable[str], travel: tuple[float, float] | None) -> tuple[tuple[str, str], ...]:
+    """(effect, loss) in a format that has only the mean level of dry friction, with a delay and an unknown travel."""
+    dry = [(name, model.library[name].is_dry) for name in effects]
+    lost = [(name, "only its mean level at speed is kept" if is_dry else f"{language} cannot express it") for name, is_dry in dry]
+    lost += [("delay", f"{language} has none")] if model.delay > 0.0 else []
+    return tuple(lost if travel is not None else [*lost, ("travel", "it is not known")])

@@ -24,28 +24,26 @@ JERK_TIME = 0.02  # least s for building up an acceleration, if there is no reso
 
 @dataclass(frozen=True, slots=True)
 class Fastest:
-    """bounds: of the fastest S-curve; path: of the move; voltage: largest of the feedforward, V; limit: V; reserve: part of it kept free."""
+    """bounds: of the fastest S-curve; path: of the move; voltage: largest of the feedforward, V."""
 
     bounds: Bounds
     path: SampledPath
     voltage: float
-    limit: float
-    reserve: float
 
 
-def fastest(models: Sequence[AxisModel], places: Sequence[float], limit: float, sampling_rate: float, reserve: float = RESERVE) -> Fastest:
-    """The S-curve through the places that takes least time while the voltage of every model stays below (1 - reserve) limit.
+def fastest(models: Sequence[AxisModel], places: Sequence[float], limit: float, sampling_rate: float) -> Fastest:
+    """The S-curve through the places that takes least time while the voltage of every model stays below (1 - ``RESERVE``) limit.
 
     models: samples of the parameters; places: m; limit: V. Raises BadInput if even the slowest motion needs more voltage.
     """
     if not 0.0 < limit < math.inf:
         raise BadInput("limit", f"{limit} V", "above 0 and finite", "Give the drive's largest voltage with limit=.")
-    usable = (1.0 - reserve) * limit
+    usable = (1.0 - RESERVE) * limit
     centre = models[0]
     held = max(_at_rest(model, min(places), max(places)) for model in models)
     if held >= usable:
         raise BadInput(
-            "limit", f"{limit:g} V", f"more than {held / (1.0 - reserve):.3g} V, which friction and load need", "Check the limit, or the model."
+            "limit", f"{limit:g} V", f"more than {held / (1.0 - RESERVE):.3g} V, which friction and load need", "Check the limit, or the model."
         )
     best: tuple[float, Bounds, SampledPath, float] | None = None
     rise = max(JERK_TIME, _ringing(centre, sampling_rate), 4.0 * centre.delay)
@@ -71,7 +69,7 @@ def fastest(models: Sequence[AxisModel], places: Sequence[float], limit: float, 
             best = (found[1].seconds, *found)
     if best is None:
         raise BadInput("limit", f"{limit:g} V", "enough for a hundredth of the rigid axis' speed", "Check the limit, or the model.")
-    return Fastest(bounds=best[1], path=best[2], voltage=best[3], limit=limit, reserve=reserve)
+    return Fastest(bounds=best[1], path=best[2], voltage=best[3])
 
 
 def _at_rest(model: AxisModel, low: float, high: float) -> float:

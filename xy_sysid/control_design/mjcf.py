@@ -51,7 +51,7 @@ class Mjcf:
     lost: tuple[tuple[str, str], ...]
 
 
-def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: str = "axis") -> Mjcf:
+def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False) -> Mjcf:
     """The model for one input ``drive``, held for a sample, and one joint with the axis' position; angular: True for a rotary axis, rad."""
     said = Said()
     _forces(model, said)
@@ -63,14 +63,14 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
         said.lost.append((effect.name, "the joint's position is the true one, without the error of the scale"))
     mass, drag, hung = _bodies(model, said)
     kind = 'type="hinge" axis="0 0 1"' if angular else 'type="slide" axis="1 0 0"'
-    behind, tendon = _behind(hung, name, kind)
+    behind, tendon = _behind(hung, kind)
     integrator = "implicitfast" if dry else "RK4"
     fine = 2.0 * FINE if dry == 0.0 and lag is None else RUBBING
     steps, waits, side = _steps(model.delay * sampling_rate, sampling_rate, fine, LEAD[integrator])
     bend, spring = _spring(said.polynomial, turn)
     curve = f" {_num(said.square)} 0" if said.square else ""
     step = 1.0 / (sampling_rate * steps)
-    drive = [f'name="drive" joint="{name}" gear="{turn:g}" gainprm="1" biastype="affine" biasprm="{_num(-bend)} 0 0"']
+    drive = [f'name="drive" joint="axis" gear="{turn:g}" gainprm="1" biastype="affine" biasprm="{_num(-bend)} 0 0"']
     if model.delay > 0.0:
         drive.append(f'delay="{_num(max(waits + side * CLEAR, 0.0) * step)}" nsample="{waits + 2}" interp="zoh"')
     if lag is not None:
@@ -78,7 +78,7 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
         drive.append(f'dyntype="filter{exact}" dynprm="{_num(lag)}"')
     if limit < math.inf:
         drive.append(f'ctrllimited="true" ctrlrange="{_num(-limit)} {_num(limit)}"')
-    quiet = f'joint="{name}" motorconst="{TINY}" resistance="1"'
+    quiet = f'joint="axis" motorconst="{TINY}" resistance="1"'
     others = [f'<dcmotor name="{who}" {quiet} cogging="{_num(-turn * size)} {_num(wave)} {_num(phase)}"/>' for who, size, wave, phase in said.waves]
     held = ""
     if isinstance(dry, tuple):
@@ -87,13 +87,13 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
         held = f' frictionloss="{_num(dry)}" solreffriction="{_num(2.0 * step)} 1" solimpfriction="0.9999 0.9999 1e-6"'
     moving = f'<inertial pos="0 0 0" mass="{_num(mass)}" diaginertia="{_num(mass)} {_num(mass)} {_num(mass)}"/>'
     lines = [
-        f'<mujoco model="{name}">',
+        '<mujoco model="axis">',
         f"  <!-- forces are in the unit of the input: the mass is kA, the damping kV; hold each input for {steps} steps, 1/{sampling_rate:g} s -->",
         *(f"  <!-- lost: {effect}: {why} -->" for effect, why in said.lost),
         f'  <option timestep="{step!r}" gravity="0 0 0" integrator="{integrator}"/>',
         "  <worldbody>",
-        f'    <body name="{name}">',
-        f'      <joint name="{name}" {kind} damping="{_num(drag)}{curve}"{spring}{held}/>',
+        '    <body name="axis">',
+        f'      <joint name="axis" {kind} damping="{_num(drag)}{curve}"{spring}{held}/>',
         f"      {moving}",
         "    </body>",
         *behind,
@@ -103,7 +103,7 @@ def mjcf(model: AxisModel, sampling_rate: float, angular: bool = False, name: st
         f"    <general {' '.join(drive)}/>",
         *(f"    {line}" for line in others),
         "  </actuator>",
-        f'  <sensor><jointpos name="position" joint="{name}"/><jointvel name="speed" joint="{name}"/></sensor>',
+        '  <sensor><jointpos name="position" joint="axis"/><jointvel name="speed" joint="axis"/></sensor>',
         "</mujoco>",
     ]
     return Mjcf("\n".join(lines) + "\n", steps, tuple(said.lost))
@@ -297,7 +297,7 @@ def _bodies(model: AxisModel, said: Said) -> tuple[float, float, Hung | None]:
     return own, drag - shared, Hung((own, stiffness * z2), (drag - shared, shared), stiffness, stiffness * z1 - shared)
 
 
-def _behind(hung: Hung | None, name: str, kind: str) -> tuple[list[str], list[str]]:
+def _behind(hung: Hung | None, kind: str) -> tuple[list[str], list[str]]:
     """Lines of the second body, and of the spring between the two."""
     if hung is None:
         return [], []
@@ -311,7 +311,7 @@ def _behind(hung: Hung | None, name: str, kind: str) -> tuple[list[str], list[st
     spring = [
         "  <tendon>",
         f'    <fixed name="spring" stiffness="{_num(hung.stiffness)}" damping="{_num(hung.damping)}" springlength="0 0">',
-        f'      <joint joint="{name}" coef="1"/><joint joint="behind" coef="-1"/>',
+        '      <joint joint="axis" coef="1"/><joint joint="behind" coef="-1"/>',
         "    </fixed>",
         "  </tendon>",
     ]

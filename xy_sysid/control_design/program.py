@@ -17,7 +17,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.control_design import series
 from xy_sysid.control_design.inverse import ahead_of, guided, parts_of_sample
 from xy_sysid.control_design.inverse_text import InverseText
-from xy_sysid.control_design.law_text import NUMBERS
+from xy_sysid.control_design.law_text import NUMBERS, WHOLE_NUMBERS
 from xy_sysid.control_design.sample_step import SERIES, Plant, plant
 from xy_sysid.control_design.step_text import ROOM, StepText
 from xy_sysid.effects._binding import called
@@ -26,7 +26,6 @@ from xy_sysid.samples.block import FloatArray
 
 ARRAYS = frozenset({"s", "w", "a", "still", "moving", "guided"})  # arguments that are arrays
 WHOLE = frozenset({"n", "cuts"})  # integer arguments
-NAMED = {"cuts_old", "cuts_new", "back_old", "back_new", "n", "ring"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +77,7 @@ def program(model: AxisModel, sampling_rate: float, inverse: AxisModel | None = 
 
 def _numbers(ready: Plant) -> dict[str, str]:
     """The numbers of a plant as text."""
-    return {name: str(round(ready.number(name))) if name in NAMED else repr(ready.number(name)) for name in NUMBERS}
+    return {name: str(round(ready.number(name))) if name in WHOLE_NUMBERS else repr(ready.number(name)) for name in NUMBERS}
 
 
 def _function(item: Callable[..., Any], name: str, known: dict[str, Any] | None = None) -> ast.FunctionDef:

@@ -146,11 +146,11 @@ def step_of(library: Library) -> Callable[..., float]:
     return compiled_text(lambda name: writer.text(name), names, parts)
 
 
-def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray, start: float = 0.0) -> FloatArray:
-    """(n,) encoder position, m, for a voltage (n,), V, from position 0 and speed ``start``, m/s; there is no feedback."""
+def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray) -> FloatArray:
+    """(n,) encoder position, m, for a voltage (n,), V, from rest at position 0; there is no feedback."""
     ready = plant(model, sampling_rate)
     step, state, room = step_of(model.library.looped([model.library[name] for name, _ in model.effects])), ready.rest(), np.zeros(ROOM * ready.order)
-    begin(ready, state, start)
+    begin(ready, state, 0.0)
     shown = np.zeros(voltage.size)
     for k, volts in enumerate(voltage[:-1].tolist()):
         shown[k + 1] = step(volts, ready.parameters, ready.flags, ready.numbers, ready.moving, ready.still, state, room)

@@ -163,11 +163,16 @@ def closed_poles(system: Sampled, controller: Controller) -> ComplexArray:
 
 def looped_poles(system: Sampled, controller: LinearSystem) -> ComplexArray:
     """Closed-loop poles with any linear controller from error to voltage."""
+    return np.linalg.eigvals(looped(system, controller)).astype(np.complex128)
+
+
+def looped(system: Sampled, controller: LinearSystem) -> FloatArray:
+    """(n, n) transition of the closed loop: the states of the plant first, then those of the controller."""
     a, b, c = system.whole_system()
     ka, kb, kc, kd = controller
     top = np.hstack((a - kd * np.outer(b, c), np.outer(b, kc)))
     bottom = np.hstack((-np.outer(kb, c), ka))
-    return np.asarray(np.linalg.eigvals(np.vstack((top, bottom))), dtype=np.complex128)
+    return np.vstack((top, bottom))
 
 
 def noise_to_voltage(system: Sampled, controller: Controller) -> float:

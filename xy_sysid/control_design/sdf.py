@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel
-from xy_sysid.control_design.laws import along, asks, friction, largest_voltage, lost_in
+from xy_sysid.control_design.laws import along, asks, lost_in, one_joint
 from xy_sysid.effects._contract import Effect
 
 PLACES = 101  # positions at which a spring is tested for linearity
@@ -18,41 +18,32 @@ ANYWHERE = -1.0, 1.0  # m or rad, range for a spring if the travel is unknown
 STRAIGHT = 1e-6  # of the largest force: largest deviation of a spring that counts as linear
 
 
-def sdf(
-    model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool, name: str = "axis"
-) -> tuple[str, tuple[tuple[str, str], ...]]:
+def sdf(model: AxisModel, travel: tuple[float, float] | None, limit: float, angular: bool) -> tuple[str, tuple[tuple[str, str], ...]]:
     """(text, (effect, loss) of each that is lost); travel: m or rad, None if unknown; limit: of the drive, V, infinite if unknown."""
-    level = 0.5 * (friction(model, abs(model.gain), 1.0) + friction(model, -abs(model.gain), -1.0))
+    mass, effort, level = one_joint(model, limit)
     places = np.linspace(*(travel or ANYWHERE), PLACES)
     pull = along(model, places, "force") * math.copysign(1.0, model.gain)
     stiffness, offset = (float(value) for value in np.polyfit(places, pull, 1))
     reach = float(np.max(np.abs(pull)))
     straight = reach > 0.0 and stiffness > 0.0 and float(np.max(np.abs(stiffness * places + offset - pull))) <= STRAIGHT * reach
-    lost = [(effect, lost_in("SDF", model.library[effect])) for effect, _ in model.effects if not (straight and _spring(model.library[effect]))]
-    if model.delay > 0.0:
-        lost.append(("delay", "SDF has none"))
-    if travel is None:
-        lost.append(("travel", "it is not known"))
-    top = min(limit, largest_voltage(model))
-    effort = top if math.isfinite(top) else 1e3 / abs(model.gain)
-    mass = 1.0 / (abs(model.gain) * model.pole)
+    lost = lost_in("SDF", model, [name for name, _ in model.effects if not (straight and _spring(model.library[name]))], travel)
     spring = f"<spring_reference>{-offset / stiffness:.9g}</spring_reference><spring_stiffness>{stiffness:.9g}</spring_stiffness>" if straight else ""
     between = f"<lower>{travel[0]:.9g}</lower><upper>{travel[1]:.9g}</upper>" if travel is not None else ""
     lines = [
         '<?xml version="1.0"?>',
         '<sdf version="1.9">',
-        f'  <model name="{name}">',
+        '  <model name="axis">',
         "    <!-- forces are in the unit of the input: the mass is kA, the damping kV -->",
         *(f"    <!-- lost: {effect}: {why} -->" for effect, why in lost),
         '    <link name="base"/>',
-        f'    <link name="{name}">',
+        '    <link name="axis">',
         f"      <inertial><mass>{mass:.9g}</mass>",
         f"        <inertia><ixx>{mass:.9g}</ixx><ixy>0</ixy><ixz>0</ixz><iyy>{mass:.9g}</iyy><iyz>0</iyz><izz>{mass:.9g}</izz></inertia>",
         "      </inertial>",
         "    </link>",
         '    <joint name="ground" type="fixed"><parent>world</parent><child>base</child></joint>',
-        f'    <joint name="{name}_joint" type="{"revolute" if angular else "prismatic"}">',
-        f"      <parent>base</parent><child>{name}</child>",
+        f'    <joint name="axis_joint" type="{"revolute" if angular else "prismatic"}">',
+        "      <parent>base</parent><child>axis</child>",
         f"      <axis><xyz>{'0 0 1' if angular else '1 0 0'}</xyz>",
         f"        <limit>{between}<effort>{effort:.9g}</effort>",
         f"          <velocity>{abs(model.gain) * effort:.9g}</velocity></limit>",
@@ -62,7 +53,7 @@ def sdf(
         "  </model>",
         "</sdf>",
     ]
-    return "\n".join(lines) + "\n", tuple(lost)
+    return "\n".join(lines) + "\n", lost
 
 
 def _spring(effect: Effect) -> bool:

@@ -205,7 +205,7 @@ def twincat(of: Designed) -> Snippet:
     ]
     head = f"(* Axis {of.axis}: input in {of.units.input}, position in {length}. Call it in a task of {cycle:g} ms. *)"
     lines = [
-        f"PROGRAM {_identifier(of.axis)}",
+        f"PROGRAM {plain_name(of.axis, 'Axis')}",
         "VAR_INPUT",
         f"    fSetPosition : LREAL; (* {length} *)",
         f"    fSetVelocity : LREAL; (* {length}/s *)",
@@ -273,8 +273,9 @@ def _unsure(of: Designed, gain: str, before: str = "") -> str:
     return f"{before}not determined by the data" if gain in of.gains.unsure else ""
 
 
-def _identifier(axis: str) -> str:
-    return "Axis_" + "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in axis)
+def plain_name(axis: str, prefix: str = "axis") -> str:
+    """A name that is valid in every language."""
+    return f"{prefix}_" + "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in axis)
 
 
 TARGETS: dict[str, Callable[[Designed], Snippet]] = {

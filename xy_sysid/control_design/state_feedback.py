@@ -21,8 +21,8 @@ import scipy.linalg
 
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.control_design.closed_loop import Controller, States
-from xy_sysid.control_design.feedback import TURN, USUAL, Asked, Margins, first_kept, loop_systems, margins_of
-from xy_sysid.control_design.sampled import Sampled, grid, on_grid, response_of
+from xy_sysid.control_design.feedback import TURN, USUAL, Asked, Margins, first_kept, loop_systems, margins_with
+from xy_sysid.control_design.sampled import LinearSystem, Sampled, looped, response_of
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 
@@ -80,23 +80,16 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = US
     def designs() -> Iterator[_Design]:
         for tried, faster in itertools.product(asked.tries(sampling_rate, STEPS), FASTER):
             try:
-                free, b, c, drive = _designed(systems[0], TURN * tried, faster)
+                yield _Design(TURN * tried, *_designed(systems[0], TURN * tried, faster))
             except np.linalg.LinAlgError:  # the Riccati equation has no solution in double precision
                 continue
-            yield _Design(TURN * tried, (free, b, c, drive), (free + np.outer(drive, c), b, c))
 
-    made, nominal, worst = first_kept(
-        "bandwidth of the state feedback", asked, systems, designs(), lambda system, item: _margins(system, *item.parts)
-    )
-    free, b, c, drive = made.numbers
-    rejects, settles = _load_step(systems[0], *made.parts)
+    what = "bandwidth of the state feedback"
+    made, nominal, worst = first_kept(what, asked, systems, designs(), lambda system, item: margins_with(system, item.within_limit))
+    rejects, settles = _load_step(systems[0], made.within_limit)
     return StateFeedback(
-        free=free,
-        b=b,
-        c=c,
-        drive=drive,
+        **made._asdict(),
         sampling_rate=sampling_rate,
-        bandwidth=made.bandwidth,
         nominal=nominal,
         worst=worst,
         count=len(systems),
@@ -106,11 +99,18 @@ def state_feedback(model: PhysicalModel, sampling_rate: float, asked: Asked = US
 
 
 class _Design(NamedTuple):
-    """bandwidth: rad/s; numbers: free, b, c, drive; parts: a, b, c within the limit."""
+    """The part of ``StateFeedback`` that is tested for its margins."""
 
     bandwidth: float
-    numbers: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-    parts: tuple[FloatArray, FloatArray, FloatArray]
+    free: FloatArray
+    b: FloatArray
+    c: FloatArray
+    drive: FloatArray
+
+    @property
+    def within_limit(self) -> LinearSystem:
+        """(A, B, C, D) from error to voltage."""
+        return self.free + np.outer(self.drive, self.c), self.b, self.c, 0.0
 
 
 def _designed(system: Sampled, bandwidth: float, faster: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -156,22 +156,9 @@ def _observer(a: FloatArray, c: FloatArray, forces: FloatArray, noise: float) ->
     return np.asarray((a @ p @ c) / (noise + c @ p @ c))
 
 
-def _margins(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> Margins:
-    """Margins of the loop, broken at the voltage."""
-    own = response_of(a, b, c, 0.0, grid(system), system.sampling_rate)
-    poles = np.linalg.eigvals(closed_loop(system, a, b, c)).astype(np.complex128)
-    return margins_of(on_grid(system) * own, grid(system), poles)
-
-
-def closed_loop(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """The closed loop's transition: plant first, then the controller."""
-    plant, into, shown = system.whole_system()
-    return np.block([[plant, np.outer(into, c)], [-np.outer(b, shown), a]])
-
-
-def _load_step(system: Sampled, a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[float, float]:
+def _load_step(system: Sampled, controller: LinearSystem) -> tuple[float, float]:
     """The largest error after a step of 1 V of load, m, and the time until it stays below a tenth of that, s."""
-    move = closed_loop(system, a, b, c)
+    move = looped(system, controller)
     push = np.zeros(move.shape[0])
     push[: system.old.size] = system.old + system.new
     slowest = float(np.max(np.abs(np.linalg.eigvals(move))))

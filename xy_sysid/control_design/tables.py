@@ -75,15 +75,17 @@ def friction_table(model: PhysicalModel, top: float) -> Correction | None:
 def position_tables(model: PhysicalModel, travel: tuple[float, float]) -> tuple[Correction, ...]:
     """The tables of force, drag, gain and scale error over the travel, m, as far as the model has them."""
     places = _places(model.model, travel)
-    kinds: tuple[tuple[str, str, str, Callable[[AxisModel], bool]], ...] = (
-        ("force", "V", "add to the command at this position", _has_force),
-        ("drag", "V/(m/s)", "add to kV at this position", _has_drag),
-        ("gain", "", "divide the command by this at this position", _has_gain),
-        ("scale", "m", "error of the encoder at this position: subtract it from the reading, or add it to the commanded position", _has_scale),
+    laws = [asks(effect) & {"x", "v", "u"} for effect, _ in of_category(model.model, "force")]
+    subtracted = "error of the encoder at this position: subtract it from the reading, or add it to the commanded position"
+    kinds = (
+        ("force", "V", "add to the command at this position", {"x"} in laws),
+        ("drag", "V/(m/s)", "add to kV at this position", {"x", "v"} in laws),
+        ("gain", "", "divide the command by this at this position", any({"x", "u"} <= law for law in laws)),
+        ("scale", "m", subtracted, any(of_category(model.model, "encoder"))),
     )
     found = []
-    for name, unit, meaning, has in kinds:
-        if has(model.model):
+    for name, unit, meaning, is_there in kinds:
+        if is_there:
             value, low, high = derive_row(model, _along(places, name))
             shown = model.units.of(unit) if unit else ""
             found.append(Correction(name=name, at=places, value=value, low=low, high=high, at_unit=model.units.output, unit=shown, meaning=meaning))
@@ -93,22 +95,6 @@ def position_tables(model: PhysicalModel, travel: tuple[float, float]) -> tuple[
 def _along(places: FloatArray, what: str) -> Callable[[AxisModel], FloatArray]:
     """The row of a table; where it is added to the command, with the friction that grows with the command."""
     return lambda item: along(item, places, what) / (driving_factor(item) if what in ("force", "drag") else 1.0)
-
-
-def _has_force(model: AxisModel) -> bool:
-    return any("x" in asks(effect) and not {"v", "u"} & asks(effect) for effect, _ in of_category(model, "force"))
-
-
-def _has_drag(model: AxisModel) -> bool:
-    return any({"x", "v"} <= asks(effect) and "u" not in asks(effect) for effect, _ in of_category(model, "force"))
-
-
-def _has_gain(model: AxisModel) -> bool:
-    return any({"x", "u"} <= asks(effect) for effect, _ in of_category(model, "force"))
-
-
-def _has_scale(model: AxisModel) -> bool:
-    return any(of_category(model, "encoder"))
 
 
 def _places(model: AxisModel, travel: tuple[float, float]) -> FloatArray:

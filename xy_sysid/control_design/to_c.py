@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import math
 
-from xy_sysid.control_design.printing import Printer, math_name, range_of
+from xy_sysid.control_design.printing import OPERATORS, Printer, math_name, range_of
 from xy_sysid.control_design.program import ARRAYS, WHOLE, Program, body_of, independent, names_assigned, returns_of, whole_names
 from xy_sysid.errors import BadInput
 
@@ -84,8 +84,7 @@ class CPrinter(Printer):
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
             self._assign(node.targets[0], node.value)
         elif isinstance(node, ast.AugAssign):
-            operator = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}[type(node.op)]
-            self.put(f"{self.expression(_loaded(node.target))} {operator}= {self.expression(node.value)};")
+            self.put(f"{self.expression(_loaded(node.target))} {OPERATORS[type(node.op)]}= {self.expression(node.value)};")
         elif isinstance(node, ast.If):
             self.put(f"if {_bracketed(self.expression(node.test))} {{")
             self.statements(node.body)

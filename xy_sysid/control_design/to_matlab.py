@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import math
 
-from xy_sysid.control_design.printing import Printer, math_name, range_of
+from xy_sysid.control_design.printing import OPERATORS, Printer, math_name, range_of
 from xy_sysid.control_design.program import ARRAYS, Program, body_of, returns_of
 
 RESERVED = "break case catch classdef continue else elseif end for function global if otherwise parfor persistent return spmd switch try while"
@@ -101,8 +101,7 @@ class MatlabPrinter(Printer):
             self._assign(node.targets[0], node.value)
         elif isinstance(node, ast.AugAssign):
             target = self._stored(node.target)
-            operator = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}[type(node.op)]
-            self.put(f"{target} = {target} {operator} {self.expression(node.value)};")
+            self.put(f"{target} = {target} {OPERATORS[type(node.op)]} {self.expression(node.value)};")
         elif isinstance(node, ast.If):
             self.put(f"if {self.expression(node.test)}")
             self.statements(node.body)

@@ -148,7 +148,7 @@ def _moved(
         own = np.zeros((2, *value.shape))
         for which, end in enumerate((item.low, item.high)):
             if math.isfinite(end):
-                way = np.linspace(item.value, _allowed(item.name, end), steps)[1:].tolist()
+                way = np.linspace(item.value, max(end, 1e-9) if item.name == "pole" else end, steps)[1:].tolist()
                 there = [np.asarray(of(with_values(model.model, {item.name: place}))) for place in way]
                 own[which] = (np.unwrap([value, *there], axis=0)[-1] if steps > 2 else there[-1]) - value
             elif not np.array_equal(of(with_values(model.model, {item.name: item.value * 1.01 + 1e-12})), value):
@@ -157,8 +157,3 @@ def _moved(
         below, above = np.hypot(below, down), np.hypot(above, up)
         parts.append((item.name, float(max(down.flat[0], up.flat[0]))))
     return value, below, above, parts
-
-
-def _allowed(name: str, value: float) -> float:
-    """The value, or the nearest that a model accepts."""
-    return max(value, 1e-9) if name == "pole" else value

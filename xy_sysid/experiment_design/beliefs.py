@@ -10,7 +10,7 @@ An effect that is not visible in the data keeps its usual size, if the data allo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,16 +100,24 @@ class Evidence:
 
     def whitened(self, model: AxisModel, scale: Scale) -> tuple[FloatArray, FloatArray]:
         """(k, m) derivatives of the error by the coordinates, and (m,) the error, both divided by its expected size."""
-        error, inner = self.error(model), scale.inner(model.row)
+        error = self.error(model)
         spectrum, _, _ = self.spectrum(error)
         weight = ((self.objective.lines > 0.0) / np.sqrt(spectrum))[self.data.layout.band]
-        rows = []
-        for k in range(inner.size):
-            step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
-            moved = inner.copy()
-            moved[k] += step
-            rows.append(((self.error(with_row(model, scale.outer(moved))) - error) / step * weight).ravel().view(np.float64))
-        return np.nan_to_num(np.array(rows)), np.nan_to_num((error * weight).ravel().view(np.float64))
+        rows = derivatives(self.error, model, scale, error) * weight
+        return np.nan_to_num(rows.reshape(len(rows), -1).view(np.float64)), np.nan_to_num((error * weight).ravel().view(np.float64))
+
+
+def derivatives(
+    of: Callable[[AxisModel], NDArray[np.complex128]], model: AxisModel, scale: Scale, now: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """(k, windows, lines) derivatives of a spectrum of a model by the coordinates of the scale; now: (windows, lines) the spectrum itself."""
+    inner, found = scale.inner(model.row), []
+    for k in range(inner.size):
+        step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
+        moved = inner.copy()
+        moved[k] += step
+        found.append((of(with_row(model, scale.outer(moved))) - now) / step)
+    return np.array(found)
 
 
 def with_row(model: AxisModel, row: FloatArray) -> AxisModel:
@@ -146,17 +154,16 @@ def believed(evidence: Evidence, found: GreyboxFit, count: int, seed: int = 0) -
     return _belief(evidence, model, draws, scale, precision)
 
 
-def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, draws: tuple[int, int]) -> Belief | None:
+def hidden(evidence: Evidence, rest: AxisModel, name: str, best: float, count: int) -> Belief | None:
     """The belief in a model that explains the data and an effect that the data do not show, with usual sizes that the data allow.
 
     The new effect replaces one of its family, and parameters of the same name keep their values. None if the data allow no such size.
-    best: nats of the model that explains the data best; draws: number of draws, and their seed
+    best: nats of the model that explains the data best; count: number of draws
     """
-    count, seed = draws
     found: list[AxisModel] = []
     shared = _shared(rest, name)
     own = {key for key in rest.library[name].names if key not in shared}
-    for drawn in _usual(evidence, rest, name, TRIES * count, seed):
+    for drawn in _usual(evidence, rest, name, TRIES * count):
         model = _settled(evidence, drawn, {f"{name}.{key}" for key in own})
         if evidence.valid(model) and evidence.nats(model) - best < ALLOWED:
             found.append(model)
@@ -198,8 +205,8 @@ def _shared(model: AxisModel, name: str) -> dict[str, float]:
     return {key: known[key] for key in model.library[name].names if key in known}
 
 
-def _usual(evidence: Evidence, rest: AxisModel, name: str, count: int, seed: int) -> Iterator[AxisModel]:
-    random, data = np.random.default_rng([seed, 1]), evidence.data
+def _usual(evidence: Evidence, rest: AxisModel, name: str, count: int) -> Iterator[AxisModel]:
+    random, data = np.random.default_rng([0, 1]), evidence.data
     both = [np.concatenate((signal, -signal)) for signal in (data.voltage, data.velocity)]  # an offset is a part of the size
     moved, shared = rest.library[name].on(Similarity.of(data.sampling_rate, *both)), _shared(rest, name)
     items = [item if item.positive else over for item, over in zip(moved, evidence.sizes(rest.library[name]), strict=True)]

@@ -40,6 +40,7 @@ FULL = _number("full", 0.95, "1", "part of the largest voltage that an experimen
 QUIETER = _number("quieter", 5, "levels", "amplitudes of each kind, each half of the one before: weak effects show at a sixteenth")
 TOP = _number("top", 0.15, "1", "highest frequency proposed, over the sampling rate: beyond it the encoder differs little from its noise")
 LONGEST = _number("longest period", 10.0, "s", "of a slow sine: six periods in the usual minute")
+SEED = _number("seed", 1, "1", "of the signals, and of the draws of an unknown axis: the same limits give the same experiment")
 PLACES = _number("places", 0.75, "1", "part of the room to either side at which the axis is held for an experiment away from its start")
 
 # how experiments are judged

@@ -96,14 +96,12 @@ class Design:
         return self.best is not None and self.best.probability >= DOUBTFUL
 
 
-def design(
-    setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, seed: int = 1, tell: Callable[[float], None] = lambda part: None
-) -> Design:
+def design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, tell: Callable[[float], None]) -> Design:
     """The best experiment for some beliefs; tell: called with the progress, 0..1."""
     setting, rate = replace(setting, ramp=limits.ramp), setting.layout.sampling_rate
     rough, closer = partial(judge, setting, beliefs, limits, *STAGES[0]), partial(judge, setting, beliefs, limits)
     judged: list[Judged] = []
-    first = proposals(limits, rate, seed)
+    first = proposals(limits, rate)
     for number, proposal in enumerate(first):
         judged.append(rough(proposal))
         tell(0.6 * (number + 1) / len(first))

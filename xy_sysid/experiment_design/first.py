@@ -17,7 +17,7 @@ from xy_sysid.axis.forward import move
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import SIMPLEST_FRICTION, SIMPLEST_LOAD
 from xy_sysid.experiment_design.beliefs import Belief
-from xy_sysid.experiment_design.criteria import COARSE, FITTED, LOOKED
+from xy_sysid.experiment_design.criteria import COARSE, FITTED, LOOKED, SEED
 from xy_sysid.experiment_design.design import broken_in_time
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
@@ -40,14 +40,14 @@ DRAWS = 8
 SHORTEST = 30.0  # s, least duration: a diagnosis needs held-out windows
 
 
-def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, seed: int = 1) -> NextExperiment:
+def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits) -> NextExperiment:
     """A good first experiment for an unknown axis: amplitude, band, duration. Raises BadInput for inconsistent limits."""
     encoder = (limits.travel[1] - limits.travel[0]) / COUNTS / math.sqrt(12.0)
     setting = Setting(bands(sampling_rate, int(LOOKED * sampling_rate / WINDOWS)), encoder, EPSILON, ramp=limits.ramp)
-    models = _draws(limits, seed)
+    models = _draws(limits)
     judged = []
     with threadpool_limits(1, "blas"):
-        for number, experiment in enumerate(proposals(limits, sampling_rate, seed)):
+        for number, experiment in enumerate(proposals(limits, sampling_rate)):
             found = _informations(setting, models, limits, experiment)
             if found:
                 tells = float(np.mean([np.linalg.slogdet(item.each_second[:3, :3] + np.eye(3))[1] for item in found]))
@@ -68,9 +68,9 @@ def first_experiment(axis: str, sampling_rate: float, limits: MachineLimits, see
     return with_needs(made, models)
 
 
-def _draws(limits: MachineLimits, seed: int) -> list[AxisModel]:
+def _draws(limits: MachineLimits) -> list[AxisModel]:
     """Possible axes, including the fastest."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(SEED)
     found = []
     for number in range(DRAWS):
         crosses, pole, delay, friction = (low * (high / low) ** random.uniform() for low, high in (CROSSES, POLE, DELAY, FRICTION))

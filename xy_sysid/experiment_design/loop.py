@@ -104,7 +104,7 @@ class Question:
 
 def best_design(setting: Setting, beliefs: Sequence[Belief], limits: MachineLimits, tell: Callable[[float], None] = lambda part: None) -> NextChoice:
     """The experiment of ``design``; none if no experiment helps. tell: called with the progress, 0..1."""
-    found: Design = design(setting, beliefs, limits, tell=tell)
+    found = design(setting, beliefs, limits, tell)
     return NextChoice(found.best.experiment if found.best is not None and found.helps else None, found)
 
 
@@ -131,12 +131,11 @@ def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Bud
         following = after(steps[-1], budget, len(recordings), spent)
         if isinstance(following, str):
             return Settled(following, tuple(steps), tuple(recordings), spent)
-        experiment = following
-        found = run(experiment)
+        found = run(following)
         if found is None:
             return Settled("stopped", tuple(steps), tuple(recordings), spent)
         recordings.append(found)
-        spent += experiment.seconds
+        spent += following.seconds
 
 
 def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> Experiment | Ending:

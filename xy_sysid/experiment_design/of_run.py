@@ -84,7 +84,7 @@ def next_experiment(
             chosen = names_of([now.names[now.chosen]])
             sentence = f"Nothing is left to settle: of {names_of(sets)} these data leave only {chosen}."
             return NextExperiment(axis=axis, sampling_rate=rate, sentence=sentence, limits=limits, sets=tuple(sets))
-        made = design(Setting.of(data), beliefs, limits, tell=tell)
+        made = design(Setting.of(data), beliefs, limits, tell)
     return answered(axis, rate, made, library)
 
 

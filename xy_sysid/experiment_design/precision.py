@@ -95,7 +95,7 @@ class Precision:
         return spread * float(belief.scale.unit[place]) / value if value else math.inf
 
 
-def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: Precision, seed: int = 1) -> Sharpest:
+def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: Precision) -> Sharpest:
     """The experiment that determines a parameter of a fit to the wanted width in the shortest time, or as well as possible.
 
     The experiment is chosen by its information. Its duration is found by a rehearsal: the fit of a simulated recording with noise.
@@ -104,19 +104,14 @@ def sharpest(data: AxisData, found: GreyboxFit, limits: MachineLimits, target: P
     if before <= target.width:
         return Sharpest(None, before, True, before)
     setting, belief = Setting.of(data, limits.ramp), believed(Evidence(data, limits.travel), found, DRAWN)
-    most = limits.seconds - limits.ramp
-    judged: list[tuple[float, float, int, Experiment]] = []
-    for experiment in _rounds(setting, belief, limits, target, seed):
-        told = informations(setting, belief, limits, experiment)
-        if told:
-            judged.append((*_needed(belief, told, target, most), len(judged), experiment))
-    if not judged:
-        return Sharpest(None, before, False, before)
+    rate, most = setting.layout.sampling_rate, limits.seconds - limits.ramp
+    near = [item for _, item in _best_first(setting, belief, limits, target, proposals(limits, rate), draws=1)[:FINAL]]
+    near += neighbours(near[0], limits, rate) if near else ()
 
     def stays(experiment: Experiment) -> bool:
         return not broken_in_time(belief.draws, data.sampling_rate, limits, experiment)
 
-    for seconds, _, _, best in sorted(judged, key=lambda item: item[:3]):
+    for seconds, best in _best_first(setting, belief, limits, target, near):
         lasts = min(max(math.ceil((seconds if math.isfinite(seconds) else most) + limits.ramp), SHORTEST), limits.seconds)
         if not stays(best.lasting(float(lasts))):
             continue
@@ -139,17 +134,16 @@ def rehearsed(data: AxisData, belief: Belief, experiment: Experiment, limits: Ma
     return target.of_interval(finish(both, belief.model).parameter(target.parameter))
 
 
-def _rounds(setting: Setting, belief: Belief, limits: MachineLimits, target: Precision, seed: int) -> Sequence[Experiment]:
-    """The best proposals, and the neighbours of the best one."""
-    rate, most = setting.layout.sampling_rate, limits.seconds - limits.ramp
-    first = proposals(limits, rate, seed)
+def _best_first(
+    setting: Setting, belief: Belief, limits: MachineLimits, target: Precision, experiments: Sequence[Experiment], draws: int = DRAWN
+) -> list[tuple[float, Experiment]]:
+    """(s until the wanted width is reached, experiment) of the experiments within the limits, the best first; infinite s if it is not reached."""
     judged: list[tuple[float, float, int, Experiment]] = []
-    for experiment in first:
-        found = informations(setting, belief, limits, experiment, draws=1)
+    for experiment in experiments:
+        found = informations(setting, belief, limits, experiment, draws)
         if found:
-            judged.append((*_needed(belief, found, target, most), len(judged), experiment))
-    best = [item[-1] for item in sorted(judged, key=lambda item: item[:3])[:FINAL]]
-    return [*best, *(neighbours(best[0], limits, rate) if best else ())]
+            judged.append((*_needed(belief, found, target, limits.seconds - limits.ramp), len(judged), experiment))
+    return [(seconds, experiment) for seconds, _, _, experiment in sorted(judged, key=lambda item: item[:3])]
 
 
 def informations(setting: Setting, belief: Belief, limits: MachineLimits, experiment: Experiment, draws: int = DRAWN) -> list[Information]:
@@ -165,7 +159,6 @@ def informations(setting: Setting, belief: Belief, limits: MachineLimits, experi
 
 def _needed(belief: Belief, found: Sequence[Information], target: Precision, most: float) -> tuple[float, float]:
     """s until the mean interval over draws reaches the wanted width, infinite if ``most`` do not suffice; and the half width then."""
-
     if _width(belief, found, target, most) > target.width:
         return math.inf, _width(belief, found, target, most)
     low, high = 0.0, most

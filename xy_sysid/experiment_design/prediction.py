@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from xy_sysid.axis.forward import Motion, move
 from xy_sysid.axis.model import AxisModel, simulator
-from xy_sysid.experiment_design.beliefs import Belief, with_row
+from xy_sysid.experiment_design.beliefs import Belief, derivatives
 from xy_sysid.experiment_design.criteria import BLOCK, COARSE, CYCLES, LOOKED
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.greybox.axis_data import FITTED_BLOCK, HELD_OUT_BLOCK, ROOM, WINDOWS, AxisData
 from xy_sysid.greybox.floor import Bands, Windows, bands, floor
-from xy_sysid.greybox.least_squares import STEP
 from xy_sysid.greybox.objective import Objective
 from xy_sysid.samples.block import FloatArray
 
@@ -119,14 +118,7 @@ def predicted(item: Recorded, model: AxisModel) -> NDArray[np.complex128]:
 
 def slopes(item: Recorded, belief: Belief, model: AxisModel, now: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """(k, windows, lines) derivatives of a model's prediction by the coordinates of its belief."""
-    inner = belief.inner(model)
-    found = []
-    for k in range(inner.size):
-        step = STEP if belief.scale.outer(inner)[k] < belief.scale.high[k] else -STEP
-        moved = inner.copy()
-        moved[k] += step
-        found.append((predicted(item, with_row(model, belief.scale.outer(moved))) - now) / step)
-    return np.nan_to_num(np.array(found))
+    return np.nan_to_num(derivatives(lambda moved: predicted(item, moved), model, belief.scale, now))
 
 
 def expected_error(item: Recorded, belief: Belief) -> FloatArray:

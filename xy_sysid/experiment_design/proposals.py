@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
-from xy_sysid.experiment_design.criteria import CREST, FULL, LONGEST, PLACES, QUIETER, TOP
+from xy_sysid.experiment_design.criteria import CREST, FULL, LONGEST, PLACES, QUIETER, SEED, TOP
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
 from xy_sysid.settings import AxisExcitation
@@ -28,9 +28,9 @@ NEAR = {
 }
 
 
-def proposals(limits: MachineLimits, sampling_rate: float, seed: int = 1) -> list[Experiment]:
+def proposals(limits: MachineLimits, sampling_rate: float) -> list[Experiment]:
     """All experiments to compare, including those that would exceed a limit."""
-    return [_experiment(limits, sampling_rate, {"seed": seed, **told}) for told in _grid(limits, sampling_rate)]
+    return [_experiment(limits, sampling_rate, {"seed": SEED, **told}) for told in _grid(limits, sampling_rate)]
 
 
 def neighbours(experiment: Experiment, limits: MachineLimits, sampling_rate: float) -> Iterator[Experiment]:

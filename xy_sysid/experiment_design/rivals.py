@@ -118,42 +118,34 @@ def _fitted(data: AxisData, library: Library, names: Sequence[str], known: AxisM
     return other if float(np.sum(other.scores)) < float(np.sum(found.scores)) else found
 
 
-def beliefs_of(
-    data: AxisData, library: Library, found: Standing, travel: tuple[float, float] | None = None, draws: int = DRAWS, seed: int = 0
-) -> list[Belief]:
+def beliefs_of(data: AxisData, library: Library, found: Standing, travel: tuple[float, float] | None = None, draws: int = DRAWS) -> list[Belief]:
     """The beliefs in the sets that the data do not rule out, the chosen set first; travel: (low, high), m, within which laws must be valid."""
     evidence = Evidence(data, travel)
     order = sorted(range(len(found.names)), key=lambda k: k != found.chosen)
     best = found.fits[found.chosen]
-    beliefs = []
-    for k in order:
-        belief = _belief(evidence, library, found.names[k], (found.fits[k], best), draws, seed)
-        if belief is not None:
-            beliefs.append(belief)
-    return beliefs
+    beliefs = (_belief(evidence, library, found.names[k], (found.fits[k], best), draws) for k in order)
+    return [belief for belief in beliefs if belief is not None]
 
 
-def _belief(
-    evidence: Evidence, library: Library, names: tuple[str, ...], fits: tuple[GreyboxFit, GreyboxFit], draws: int, seed: int
-) -> Belief | None:
+def _belief(evidence: Evidence, library: Library, names: tuple[str, ...], fits: tuple[GreyboxFit, GreyboxFit], draws: int) -> Belief | None:
     """The belief in a set, None if the data rule it out; fits: of this set, and of the chosen one."""
     own, best = fits
     if own is best:
-        return believed(evidence, own, draws, seed)
+        return believed(evidence, own, draws)
     rest = frozenset(name for name, _ in best.model.effects)
     new = [name for name in names if name not in rest]
     holds = contains(library, frozenset(names), rest)  # then a worse fit is only not the optimum
     better = gained(evidence.data, best, own)
     if len(new) == 1 and holds and not gained(evidence.data, own, best).is_sure:
-        model, least = best.model, evidence.nats(best.model)
+        model, least, family = best.model, evidence.nats(best.model), library[new[0]].family
         for name in rest - frozenset(names):
-            model = model if _gives_way(library, new[0], name) else model.without(name)
-        unseen = hidden(evidence, model, new[0], least, (draws, seed))
+            model = model if family and library[name].family == family else model.without(name)
+        unseen = hidden(evidence, model, new[0], least, draws)
         if unseen is not None or _is_gone(evidence.data, own, new[0]) or evidence.nats(own.model) > least + ALLOWED:
             return unseen
     elif not holds and better.probability > CHANCE and better.nats > PRICE:
         return None
-    return believed(evidence, own, draws, seed)
+    return believed(evidence, own, draws)
 
 
 def _is_gone(data: AxisData, found: GreyboxFit, name: str) -> bool:
@@ -161,10 +153,6 @@ def _is_gone(data: AxisData, found: GreyboxFit, name: str) -> bool:
     effect = found.model.library[name]
     pairs = zip(effect.on(data.similar), dict(found.model.effects)[name], strict=True)
     return any(item.positive and (k == 0 or "V" in item.unit) and value < LEAST_START * abs(item.typical) for k, (item, value) in enumerate(pairs))
-
-
-def _gives_way(library: Library, name: str, other: str) -> bool:
-    return bool(library[name].family) and library[name].family == library[other].family
 
 
 def possible(data: AxisData, library: Library, found: Answer, most: int = 4) -> list[tuple[str, ...]]:

@@ -90,8 +90,9 @@ def step(plan: WalkPlan, runs: Sequence[Run], before: WalkStep | None = None, te
     runs: the first recording, and one of each experiment so far; before: the step before the last experiment, None at the first
     Raises BadInput if the recordings do not suffice for a diagnosis, or if the last one ends outside the travel.
     """
-    if plan.robot is not None:
-        runs = _of_one_rate(runs)
+    if plan.robot is not None:  # rates from jittering stamps of joint states differ a little
+        rate = runs[0].sampling_rate
+        runs = [replace(run, sampling_rate=rate) if abs(run.sampling_rate / rate - 1.0) <= SAME_RATE else run for run in runs]
     found = diagnose(list(runs), plan.library, tolerance=plan.tolerance)
     check_enough(found)
     rate, signals, units = runs[0].sampling_rate, [(run.voltage, run.position) for run in runs], runs[0].units
@@ -138,12 +139,6 @@ def steps(plan: WalkPlan, recordings: Sequence[Run]) -> Iterator[WalkStep]:
         yield before
         if before.ending is not None:
             return
-
-
-def _of_one_rate(runs: Sequence[Run]) -> list[Run]:
-    """The runs with the sampling rate of the first: rates from jittering stamps of joint states differ a little."""
-    rate = runs[0].sampling_rate
-    return [replace(run, sampling_rate=rate) if abs(run.sampling_rate / rate - 1.0) <= SAME_RATE else run for run in runs]
 
 
 def told(decision: Decision, ending: Ending, answer: NextExperiment | None = None) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -142,7 +141,7 @@ def package_version() -> str:
         return "from source"
 
 
-def versions(packages: Sequence[str] = ("numpy", "scipy", "numba")) -> str:
+def versions() -> str:
     """Versions of all software that affects a row, in one line."""
-    others = ", ".join(f"{name} {version(name)}" for name in packages)
+    others = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
     return f"xy_sysid {package_version()}, rows {ROWS}, python {platform.python_version()}, {others}"

@@ -24,7 +24,7 @@ def learned(every: Iterable[Named]) -> FloatArray:
     total = np.zeros(OFTEN.size)
     for named in every:
         if named.size > 1:
-            total += np.logaddexp(_log(_yes(named), named.size), logsumexp(_changed(named), axis=1) - np.log(named.size - 1))
+            total += np.logaddexp(_unchanged(named), logsumexp(_changed(named), axis=1) - np.log(named.size - 1))
     return np.asarray(total - logsumexp(total))
 
 
@@ -34,7 +34,7 @@ def statistic(named: Named, weights: FloatArray) -> FloatArray:
     for count in range(2, named.size + 1):
         part = named[:count]
         changed = weights + logsumexp(_changed(part), axis=1)
-        found[count - 1] = logsumexp(changed) - logsumexp(weights + _log(_yes(part), count))
+        found[count - 1] = logsumexp(changed) - logsumexp(weights + _unchanged(part))
     return found
 
 
@@ -45,18 +45,15 @@ def after(named: Named, weights: FloatArray) -> tuple[int, int, int]:
     return int(np.argmax(log)), int(np.searchsorted(total, 0.025)), min(int(np.searchsorted(total, 0.975)), named.size - 2)
 
 
-def _yes(named: Named) -> NDArray[np.int64]:
-    return np.array([np.count_nonzero(named)])
+def _unchanged(named: Named) -> FloatArray:
+    """(parameters,) log probability without a change."""
+    return np.asarray(_of_each(np.array([np.count_nonzero(named)]), np.array([named.size]))[:, 0])
 
 
 def _changed(named: Named) -> FloatArray:
     """(parameters, n - 1) log probability with a change after each recording but the last."""
     yes, count = np.cumsum(named, dtype=np.int64)[:-1], np.arange(1, named.size)
     return _of_each(yes, count) + _of_each(np.count_nonzero(named) - yes, named.size - count)
-
-
-def _log(yes: NDArray[np.int64], count: int) -> FloatArray:
-    return np.asarray(_of_each(yes, np.array([count]))[:, 0])
 
 
 def _of_each(yes: NDArray[np.int64], count: NDArray[np.int64]) -> FloatArray:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
+
+from nicegui import run, ui
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.page.session import Session
@@ -30,6 +32,33 @@ async def beside(session: Session, work: Callable[[], Awaitable[Made | Exception
         sys.stderr.write(printable(attempt.detail) + "\n")
     session.say(problem)
     return None
+
+
+async def waited(session: Session, words: str, work: Callable[..., Any], *arguments: object) -> Any:
+    """As ``beside``, the result of the work in a thread; the page shows these words until it ends."""
+    waiting = ui.notification(words, spinner=True, timeout=None)
+    try:
+        return await beside(session, lambda: run.io_bound(work, *arguments))
+    finally:
+        waiting.dismiss()
+
+
+class OneCommand:
+    """Runs the commands of a card, one at a time."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.running = False
+
+    async def run(self, command: str, work: Callable[..., Any], *arguments: object) -> Any:
+        """As ``waited``; None also while another command runs."""
+        if self.running:
+            return None
+        self.running = True
+        try:
+            return await waited(self._session, f"xy-sysid {command} is running ...", work, *arguments)
+        finally:
+            self.running = False
 
 
 def returned(work: Callable[..., Made], *arguments: object) -> Made | XySysidError | OSError:

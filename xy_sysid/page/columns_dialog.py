@@ -12,7 +12,7 @@ from nicegui.events import ValueChangeEventArguments
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.imports.reading import OF_AN_AXIS
-from xy_sysid.page.beside import beside
+from xy_sysid.page.beside import beside, waited
 from xy_sysid.page.fields import on_press, typed
 from xy_sysid.page.orders import Reading, read_so
 from xy_sysid.page.session import Session
@@ -88,11 +88,7 @@ def usable(found: Listing) -> list[str]:
 
 async def columns_dialog(session: Session, name: str) -> None:
     """Show the columns of a table on the shelf, let the user assign them, and open the table."""
-    waiting = ui.notification(f"Reading the columns of {name} ...", spinner=True, timeout=None)
-    try:
-        found: Listing | None = await beside(session, lambda: run.io_bound(_listed, session.shelf.find(name)))
-    finally:
-        waiting.dismiss()
+    found: Listing | None = await waited(session, f"Reading the columns of {name} ...", lambda: _listed(session.shelf.find(name)))
     if found is not None:
         ColumnsDialog(session, name, found)
 

@@ -93,7 +93,7 @@ class Control:
         self._recording()
         if not self._speed and "excitation" in heard.present and session.link is not None:
             self._speed = 1.0
-            session.link.get_parameters("excitation", ["speed"], self._paced, lambda done, words: None)
+            session.link.get_parameters("excitation", ["speed"], self._paced)
         waits = not begun and state in ("unconfigured", "inactive")
         if (waits, state) != self._filled:
             self._filled = waits, state
@@ -172,18 +172,8 @@ class Control:
             else:
                 session.say(f"STOP is now held by {now or 'nobody else'}, no longer by {held}: nothing was overridden")
 
-        def sure() -> None:
-            dialog.close()
-            ask(named)
-
-        with ui.dialog() as dialog, ui.element("div").classes("card"):
-            ui.html("<h2>Another user holds STOP</h2>", sanitize=False)
-            ui.label(f"STOP is on from: {held}. Look at the machine and ask the holder before you override it. Then press Activate.")
-            with ui.element("div").classes("buttons"):
-                ui.button("Override STOP", on_click=sure).props("unelevated no-caps data-act=override")
-                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
-        dialog.on("hide", dialog.delete)
-        dialog.open()
+        words = f"STOP is on from: {held}. Look at the machine and ask the holder before you override it. Then press Activate."
+        will_move.confirm("Another user holds STOP", words, "Override STOP", "override", lambda: ask(named))
 
     def _forget(self) -> None:
         session = self._session

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from nicegui import run, ui
+from nicegui import ui
 
 from xy_sysid.live.coupling_messages import COUPLING_COLUMNS
-from xy_sysid.page.beside import asked, beside
+from xy_sysid.page.beside import OneCommand, asked
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.orders import Source
 from xy_sysid.page.plot import Plot
@@ -28,7 +28,7 @@ class CouplingCard:
         self._session, self._source = session, source
         self._found: dict[str, Any] = {}
         self._count = 0
-        self._working = False
+        self._command = OneCommand(session)
         kind = "card coupling live" if source.live else "card coupling"
         with ui.element("section").classes(kind).props('aria-label="two axes at once"') as self._card:
             ui.html("<h2>Two axes at once</h2>", sanitize=False)
@@ -65,15 +65,7 @@ class CouplingCard:
 
     async def _ask(self) -> None:
         path, how = getattr(self._source, "path", None), getattr(self._source, "how", self._session.reading)
-        if path is None or self._working:
-            return
-        self._working = True
-        waiting = ui.notification("xy-sysid coupling is running ...", spinner=True, timeout=None)
-        try:
-            text = await beside(self._session, lambda: run.io_bound(coupling_text, path, how.words))
-        finally:
-            self._working = False
-            waiting.dismiss()
+        text = await self._command.run("coupling", coupling_text, path, how.words) if path is not None else None
         if text:
             self._found, self._count = json.loads(str(text)), self._count + 1
 

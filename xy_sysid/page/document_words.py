@@ -11,6 +11,7 @@ from xy_sysid.report.story_words import confidence
 from xy_sysid.report.words import quantity
 
 Document = Mapping[str, Any]
+SHOWN = 8  # candidates
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +33,9 @@ def model_effects(document: Document) -> list[str]:
     return [str(name) for name in ladder[-1].get("effects", [])] if ladder else []
 
 
-def candidate_rows(document: Document, most: int = 8) -> list[Row]:
+def candidate_rows(document: Document) -> list[Row]:
     """The tested candidates, best first, with their evidence."""
-    return [Row(str(item["effect"]), spaced(str(item["evidence"]))) for item in (document.get("candidates") or [])[:most]]
+    return [Row(str(item["effect"]), spaced(str(item["evidence"]))) for item in (document.get("candidates") or [])[:SHOWN]]
 
 
 def look_alike_lines(document: Document) -> list[str]:

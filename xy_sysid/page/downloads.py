@@ -7,10 +7,10 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from nicegui import run, ui
+from nicegui import ui
 
 from xy_sysid.files.story_models import model_text
-from xy_sysid.page.beside import asked, beside
+from xy_sysid.page.beside import asked, waited
 from xy_sysid.page.orders import Reading, Source
 from xy_sysid.page.session import Session
 
@@ -44,14 +44,10 @@ class Downloads:
         if path is None:
             self._session.say("A report needs a recording. Record a bag and open it.")
             return
-        waiting = ui.notification("The report is being written ...", spinner=True, timeout=None)
-        try:
-            reading = getattr(self._source, "how", self._session.reading)
-            page = await beside(self._session, lambda: run.io_bound(report_text, path, reading))
-            if page:
-                ui.download.content(page, f"{plain_name(self._source.title)}.report.html")
-        finally:
-            waiting.dismiss()
+        reading = getattr(self._source, "how", self._session.reading)
+        page = await waited(self._session, "The report is being written ...", report_text, path, reading)
+        if page:
+            ui.download.content(page, f"{plain_name(self._source.title)}.report.html")
 
 
 def report_text(path: Path, reading: Reading) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.page.topics_state import columns
+from xy_sysid.report.story_curves import between
 from xy_sysid.report.story_parts import pictured, row
 from xy_sysid.report.words import interval_text, moved, number, quantity
 from xy_sysid.samples.block import FloatArray
@@ -93,8 +94,8 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
     held, floor = float(last["held_out_error"]), float(last["noise_floor"])
     fails = held > WORTH * floor
     found = [
-        Fact("held-out error", moved(held, unit, 3), MEANINGS["held-out error"], bool(last["explained"]) or (False if fails else None)),
-        Fact("noise floor", moved(floor, unit, 3), MEANINGS["noise floor"]),
+        Fact("held-out error", moved(held, unit), MEANINGS["held-out error"], bool(last["explained"]) or (False if fails else None)),
+        Fact("noise floor", moved(floor, unit), MEANINGS["noise floor"]),
     ]
     pictures = (pictured(document, step) or {}).get("pictures")
     if pictures is not None:
@@ -106,7 +107,7 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
         response = document["measured"]["frequency_response"]
         trusted = np.array(response["trusted"], dtype=bool)
         if bool(trusted.any()):
-            inside = slice(int(np.flatnonzero(trusted)[0]), int(np.flatnonzero(trusted)[-1]) + 1)
+            inside = between(trusted)
             measured = coherence_fact(row(response["frequency"])[inside], row(response["coherence"])[inside])
             found.append(replace(measured, label="linear part", meaning=MEANINGS["linear part"], good=None))
     for name, text in parameter_rows(last["parameters"]):
@@ -130,7 +131,7 @@ def base_fails(document: Mapping[str, Any] | None) -> str:
     held, floor = float(base["held_out_error"]), float(base["noise_floor"])
     if held <= WORTH * floor:
         return ""
-    left = moved(held, str(document["error"]["unit"]), 3)
+    left = moved(held, str(document["error"]["unit"]))
     return f"In time a linear model fails: it leaves {left}, {number(held / floor, 2)} times the noise floor."
 
 

@@ -141,8 +141,8 @@ class Link:
 
         self._orders.put(order)
 
-    def get_parameters(self, node: str, names: list[str], give: Callable[[dict[str, Any]], None], told: Told) -> None:
-        """Read the node's current parameter values; ``give`` receives them."""
+    def get_parameters(self, node: str, names: list[str], give: Callable[[dict[str, Any]], None]) -> None:
+        """Read the node's current parameter values; ``give`` receives them, if the node answers."""
 
         def read(answer: Any) -> tuple[bool, str]:
             give({name: parameter_value_to_python(value) for name, value in zip(names, answer.values, strict=False)})
@@ -150,7 +150,7 @@ class Link:
 
         request = GetParameters.Request(names=names)
         question = _Question(kind=GetParameters, service=f"{node}/get_parameters", request=request, read=read, again=AGAIN)
-        self._orders.put(lambda line: line.call(question, told))
+        self._orders.put(lambda line: line.call(question, lambda done, words: None))
 
     # the watch
 

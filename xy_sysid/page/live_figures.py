@@ -13,7 +13,8 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.page.topics_state import Tracked, columns, thinned
 from xy_sysid.report.parts import band, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
-from xy_sysid.report.story_parts import LINE, NAMED
+from xy_sysid.report.story_curves import fit_range, stretches
+from xy_sysid.report.story_parts import LINE, NAMED, grey
 from xy_sysid.report.theme import BEFORE, FAILS, MEASURED, MODEL, UNTRUSTED, fade
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
@@ -40,6 +41,7 @@ def response_figure(
     kept = kept[frequency[kept] > 0]
     frequency, coherence, response, sigma = frequency[kept], coherence[kept], response[kept], table["sigma"][kept]
     trusted = coherence >= LEAST
+    usable = trusted if bool(trusted.any()) else ~trusted
     figure = rows(4, shared=True, gap=0.04, heights=[0.24, 0.36, 0.24, 0.16])
     part = Z95 * np.where(np.isfinite(sigma), sigma, 0.0) / np.sqrt(2) / np.maximum(np.abs(response), 1e-300)
     level, phase = decibel(response, units.output), phase_of(response)
@@ -70,12 +72,10 @@ def response_figure(
     _residual(figure, comparison)
     figure.update_yaxes(title_text="residual (σ)", type="log", dtick=1, tickformat="~g", row=1, col=1)
     figure.update_yaxes(title_text=f"dB re 1 {plain(over(readable(units.output)[1], units.input))}", row=2, col=1)
-    figure.update_yaxes(title_text="phase (°)", dtick=turns([phase[trusted] if bool(trusted.any()) else phase]), row=3, col=1)
+    figure.update_yaxes(title_text="phase (°)", dtick=turns([phase[usable]]), row=3, col=1)
     figure.update_yaxes(title_text="coherence", range=[-0.03, 1.05], row=4, col=1)
     for row, found in shown.items():
-        seen = np.concatenate([values[trusted] if bool(trusted.any()) else values for values in found])
-        room = max(0.06 * float(np.ptp(seen)), 1.0)
-        figure.update_yaxes(range=[float(seen.min()) - room, float(seen.max()) + room], row=row, col=1)
+        fit_range(figure, row, [values[usable] for values in found])
     frequency_axis(figure, 4, [frequency])
     figure.update_layout(height=700)
     return figure
@@ -154,10 +154,8 @@ def _curve(figure: go.Figure, row: int, curve: tuple[FloatArray, FloatArray], li
 
 def _untrusted(figure: go.Figure, row: int, x: FloatArray, y: FloatArray, which: np.ndarray, legend: bool) -> None:
     if bool(which.any()):
-        grey = fade(UNTRUSTED, 0.75)
-        marker = {"color": grey, "size": 4, "symbol": "x-thin", "line": {"width": 1, "color": grey}}
         figure.add_scatter(
-            x=x[which], y=y[which], mode="markers", marker=marker, name="not trusted", legendgroup="not", showlegend=legend, row=row, col=1
+            x=x[which], y=y[which], mode="markers", marker=grey(), name="not trusted", legendgroup="not", showlegend=legend, row=row, col=1
         )
 
 
@@ -165,5 +163,4 @@ def _stretches(trusted: np.ndarray, frequency: FloatArray) -> list[slice]:
     """Slices of consecutive trusted lines."""
     if bool(trusted.all()):
         return unbroken(frequency) if frequency.size > 2 else [slice(0, frequency.size)]
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], trusted.astype(np.int8), [0]))))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return stretches(trusted)

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
-from xy_sysid.page.beside import asked, beside
+from xy_sysid.page.beside import OneCommand, asked
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.orders import Source
 from xy_sysid.page.session import Session
@@ -44,7 +44,7 @@ class QuestionsCard:
 
     def __init__(self, session: Session, source: Source) -> None:
         self._session, self._source = session, source
-        self._working = False
+        self._command = OneCommand(session)
         with ui.element("section").classes("card use").props('aria-label="more about this recording"') as self._card:
             ui.html("<h2>More about this recording</h2>", sanitize=False)
             with ui.element("div").classes("buttons"):
@@ -67,17 +67,11 @@ class QuestionsCard:
 
     async def _ask(self, question: Question) -> None:
         path, how = getattr(self._source, "path", None), getattr(self._source, "how", self._session.reading)
-        if path is None or self._working:
+        if path is None:
             return
         given = [(option, self._fields[option].value) for option in question.options]
         words = [word for option, value in given if value not in (None, "") for word in (option, str(value))]
-        self._working = True
-        waiting = ui.notification(f"xy-sysid {question.command} is running ...", spinner=True, timeout=None)
-        try:
-            text = await beside(self._session, lambda: run.io_bound(answer, question.command, path, (*how.words, *words)))
-        finally:
-            self._working = False
-            waiting.dismiss()
+        text = await self._command.run(question.command, answer, question.command, path, (*how.words, *words))
         if text:
             self._text.clear()
             with self._text:

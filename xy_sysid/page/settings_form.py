@@ -83,7 +83,7 @@ class SettingsForm:
         """Request the node's values."""
         if self._session.link is not None:
             names = [f"{self._axis}.{name}" for name in self._fields]
-            self._session.link.get_parameters("excitation", names, self._got, lambda done, words: None)
+            self._session.link.get_parameters("excitation", names, self._got)
 
     def _field(self, item: Knob) -> None:
         if item.choices:

@@ -19,6 +19,7 @@ from xy_sysid.page.plot import Plot
 from xy_sysid.page.session import Session
 from xy_sysid.report import story_figures as draw
 from xy_sysid.report.headline import detail, headline, next_act
+from xy_sysid.report.story_parts import words
 from xy_sysid.units import chosen_units
 
 BUTTONS: tuple[tuple[OrderKind, str, str], ...] = (
@@ -111,7 +112,7 @@ class StoryCard:
         self._fill(document, able and not quiet)
         effects = self._source.effects()
         if len(effects) != len(self._choice.options):
-            self._choice.set_options({name: _words(name) for name in effects})
+            self._choice.set_options({name: words(name) for name in effects})
         stamp = (axis, at, chosen_units(), document is None and self._source.words(axis))
         if stamp != self._shown:
             self._shown = stamp
@@ -142,7 +143,7 @@ class StoryCard:
             return
         self._filled = chosen, name, able
         self._named = name
-        self._buttons["named"].set_text(f"Add {_words(name)}")
+        self._buttons["named"].set_text(f"Add {words(name)}")
         for own, button in self._buttons.items():
             if own in ("named", "keep"):
                 button.set_visibility(own == chosen)
@@ -189,12 +190,12 @@ class StoryCard:
             ui.label("Model: rigid with delay" + ("" if there else ", nothing else"))
             for name in there:
                 with ui.element("div").classes("buttons"):
-                    ui.label(_words(name)).classes("chip")
+                    ui.label(words(name)).classes("chip")
                     self._row_button("Remove", "remove", name)
         with self._ranked:
             for row in candidate_rows(document):
                 with ui.element("div").classes("candidate"):
-                    ui.label(f"{_words(row.effect)}: {row.evidence}").classes("small")
+                    ui.label(f"{words(row.effect)}: {row.evidence}").classes("small")
                     if row.effect not in there:
                         self._row_button("Add", "add", row.effect)
         with self._more:
@@ -207,9 +208,7 @@ class StoryCard:
 
     def _row_button(self, text: str, act: OrderKind, name: str) -> None:
         button = heeded(
-            ui.button(text, on_click=lambda: self._ask(act, name)).props(
-                f'outline dense no-caps aria-label="{text} {_words(name)}" data-{act}={name}'
-            )
+            ui.button(text, on_click=lambda: self._ask(act, name)).props(f'outline dense no-caps aria-label="{text} {words(name)}" data-{act}={name}')
         )
         button.set_enabled(self._source.job(self._axis) is None)
         self._rows.append(button)
@@ -217,7 +216,3 @@ class StoryCard:
     def _compare(self) -> None:
         if self._first.value is not None and self._last.value is not None:
             self._pair = (int(self._first.value), int(self._last.value))
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

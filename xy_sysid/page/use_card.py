@@ -6,9 +6,9 @@ import html
 from pathlib import Path
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
-from xy_sysid.page.beside import beside
+from xy_sysid.page.beside import OneCommand
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.downloads import plain_name
 from xy_sysid.page.orders import Source
@@ -25,7 +25,7 @@ class UseCard:
     def __init__(self, session: Session, source: Source) -> None:
         self._session, self._source = session, source
         self._shown: object = None
-        self._working = False
+        self._command = OneCommand(session)
         with ui.element("section").classes("card use").props('aria-label="use the model"') as self._card:
             ui.html("<h2>Use the model</h2>", sanitize=False)
             ui.label("Numbers for your controller, and files for other programs, from the newest models.").classes("soft small")
@@ -44,7 +44,7 @@ class UseCard:
         """Update the card."""
         documents = self._documents()
         for button in (self._numbers, self._files):
-            button.set_enabled(bool(documents) and not self._working)
+            button.set_enabled(bool(documents) and not self._command.running)
         there = self._source.live and FOLLOWER in self._session.heard.present
         self._path.set_visibility(there)
         if there:
@@ -80,7 +80,7 @@ class UseCard:
             )
 
     async def _tell(self) -> None:
-        text = await self._do(used_text, *self._asked())
+        text = await self._command.run("use", used_text, *self._asked())
         if text:
             self._text.clear()
             with self._text:
@@ -88,21 +88,9 @@ class UseCard:
             self._text.set_visibility(True)
 
     async def _pack(self) -> None:
-        packed = await self._do(used_files, *self._asked())
+        packed = await self._command.run("use", used_files, *self._asked())
         if packed:
             ui.download.content(packed, f"{plain_name(self._source.title)}.use.zip")
-
-    async def _do(self, act: Any, *arguments: Any) -> Any:
-        """The result of ``act``, computed outside the page's loop; None if it is refused, with a message, or while it runs."""
-        if self._working:
-            return None
-        self._working = True
-        waiting = ui.notification("xy-sysid use is running ...", spinner=True, timeout=None)
-        try:
-            return await beside(self._session, lambda: run.io_bound(act, *arguments))
-        finally:
-            self._working = False
-            waiting.dismiss()
 
 
 def _lines(text: str) -> str:

@@ -1,4 +1,4 @@
-"""The confirmation before the machine moves."""
+"""The confirmation before the machine moves, and of other acts that a click alone must not do."""
 
 from __future__ import annotations
 
@@ -18,14 +18,19 @@ def ask(session: Session, words: str, button: str, part: str, go: Callable[[], o
     """
     if SIMULATED in session.heard.present:
         go()
-        return
+    else:
+        confirm("The machine will move", words, button, part, go)
+
+
+def confirm(title: str, words: str, button: str, part: str, go: Callable[[], object]) -> None:
+    """Call ``go`` once the user has pressed the button in a dialog; part: its data-act."""
 
     def sure() -> None:
         dialog.close()
         go()
 
     with ui.dialog() as dialog, ui.element("div").classes("card"):
-        ui.html("<h2>The machine will move</h2>", sanitize=False)
+        ui.html(f"<h2>{title}</h2>", sanitize=False)
         ui.label(words)
         with ui.element("div").classes("buttons"):
             ui.button(button, on_click=sure).props(f"unelevated no-caps data-act={part}")

@@ -121,7 +121,7 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
         return replace(studied, fits={}, pair=None, problem=str(refusal)), None
     except (np.linalg.LinAlgError, ZeroDivisionError):
         problem = "The coefficients of the transfer function are too large for the computer. Lower the orders or widen the band."
-        return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=None, fits={}, pair=None, change=None, problem=problem), None
+        return AxisStudy(axis=axis, excitation=drive, motion=moved, problem=problem), None
 
 
 def told(recording: Recording, axis: str, wanted: Wanted) -> Mapping[str, Any]:

@@ -64,7 +64,7 @@ def position(outputs: Mapping[str, Motion], unit: str) -> str:
     """Caption of figure 3."""
     each = ". ".join(
         f"Axis {axis}: from {quantity(one.low, unit, 3)} to {quantity(one.high, unit, 3)}, "
-        f"drift {quantity(one.drift * 60, f'{unit}', 3)} a minute (dashed)"
+        f"drift {quantity(one.drift * 60, unit, 3)} a minute (dashed)"
         for axis, one in outputs.items()
     )
     return f"The measured position, drawn as minimum and maximum of short intervals, so no peak is lost. {each}."

@@ -70,9 +70,9 @@ def next_act(document: Document | None) -> tuple[str, str] | None:
     return ("keep" if last["effects"] else "next", "") if document["note"] or document["verdict"] == "not_in_library" else ("next", "")
 
 
-def worst(document: Document, step: int = -1) -> dict[str, Any] | None:
-    """The place where a step's model has the largest error; None if it fails nowhere."""
-    pictures = document["steps"][step]["pictures"] if document["steps"] else None
+def worst(document: Document) -> dict[str, Any] | None:
+    """The place where the newest model has the largest error; None if it fails nowhere."""
+    pictures = document["steps"][-1]["pictures"] if document["steps"] else None
     failing = pictures["failing"] if pictures else []
     return max(failing, key=lambda item: float(item["error_over_floor"])) if failing else None
 
@@ -93,11 +93,11 @@ def _fall(document: Document) -> str:
 
 
 def _error(document: Document, item: Document) -> str:
-    return moved(float(item["held_out_error"]), str(document["error"]["unit"]), 3)
+    return moved(float(item["held_out_error"]), str(document["error"]["unit"]))
 
 
 def _floor(document: Document, item: Document) -> str:
-    return f"noise floor {moved(float(item['noise_floor']), str(document['error']['unit']), 3)}"
+    return f"noise floor {moved(float(item['noise_floor']), str(document['error']['unit']))}"
 
 
 def _times(item: Document) -> str:

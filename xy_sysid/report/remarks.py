@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from xy_sysid.fitting import Fit
-from xy_sysid.report.study import AxisStudy, BeforeAfter
+from xy_sysid.report.study import AxisStudy
 from xy_sysid.report.tables import roots_text
 from xy_sysid.report.words import estimate_text, interval_text, number
 from xy_sysid.response.frf import ComplexArray
@@ -91,7 +91,7 @@ def _change(one: AxisStudy) -> list[str]:
             continue
         size = interval_text(shift.value, shift.low, shift.high, "Hz")
         text = f"Axis {one.axis}: the {shift.name} moved {direction} from {change.before_name} to {change.after_name}: {size}."
-        if _misses(change):
+        if any(pair is not None and pair.fit.consistent is False for pair in (change.before, change.after)):  # the error exceeds the noise
             text += (
                 " The model error exceeds the noise, and the interval includes noise only. A shift that is small compared with the spacing of "
                 "the lines may not be a change of the machine."
@@ -100,8 +100,3 @@ def _change(one: AxisStudy) -> list[str]:
     if change.shifts and not any(shift.certain for shift in change.shifts):
         made.append(f"Axis {one.axis}: the shift of the pair is within its interval.")
     return made
-
-
-def _misses(change: BeforeAfter) -> bool:
-    """True if the residual error of either fit is above the noise."""
-    return any(pair is not None and pair.fit.consistent is False for pair in (change.before, change.after))

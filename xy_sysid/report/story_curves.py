@@ -24,7 +24,7 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
     scale, unit = readable(document["units"]["output"])
     lift = 20 * np.log10(scale)
     frequency, trusted = row(measured["frequency"]), np.array(measured["trusted"], dtype=bool)
-    pieces, seen = stretches(trusted), _between(trusted)
+    pieces, seen = stretches(trusted), between(trusted)
     figure = drawing([0.58, 0.42], 420, mode)
     curves = (
         (1, "magnitude_db", "magnitude_low_db", "magnitude_high_db", lift),
@@ -49,8 +49,8 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
                 x=frequency[~trusted], y=values[~trusted], mode="markers", marker=grey(), name="not trusted", legendgroup="not",
                 showlegend=first, row=at, col=1,
             )  # fmt: skip
-    _range(figure, 1, [(row(measured["magnitude_db"]) + lift)[seen], (row(model["magnitude_db"]) + lift)[seen]])
-    _range(figure, 2, [row(measured["phase_deg"])[seen], row(model["phase_deg"])[seen]])
+    fit_range(figure, 1, [(row(measured["magnitude_db"]) + lift)[seen], (row(model["magnitude_db"]) + lift)[seen]])
+    fit_range(figure, 2, [row(measured["phase_deg"])[seen], row(model["phase_deg"])[seen]])
     figure.update_yaxes(title_text=f"dB re 1 {plain(over(unit, document['units']['input']))}", row=1, col=1)
     figure.update_yaxes(title_text="phase (°)", dtick=turns([row(measured["phase_deg"])[seen]]), row=2, col=1)
     frequency_axis(figure, 2, [frequency])
@@ -92,7 +92,8 @@ def poles_zeros(document: Document, step: int | None = None, mode: str = "light"
     figure = drawing([1.0], 260, mode)
     edge = 1.0
     for name, symbol, colour in (("poles", "x-thin", MODEL), ("zeros", "circle-open", MEASURED)):
-        roots = [(float(item["real"]), sign * float(item["imag"]), item) for item in shown["pictures"]["linear"][name] for sign in _signs(item)]
+        stored = [(item, sign) for item in shown["pictures"]["linear"][name] for sign in ((1, -1) if item["imag"] else (1,))]  # a pair is stored once
+        roots = [(float(item["real"]), sign * float(item["imag"]), item) for item, sign in stored]
         if not roots:
             continue
         edge = max(edge, *(abs(value) for x, y, _ in roots for value in (x, y)))
@@ -113,24 +114,20 @@ def poles_zeros(document: Document, step: int | None = None, mode: str = "light"
     return figure
 
 
-def _signs(root: dict[str, float]) -> tuple[int, ...]:
-    """Signs of the imaginary part to draw: both for a pair, which is stored once."""
-    return (1, -1) if abs(root["imag"]) > 0 else (1,)
-
-
 def stretches(trusted: np.ndarray) -> list[slice]:
     """Slices of consecutive trusted lines."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], trusted.astype(np.int8), [0]))))
     return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _between(trusted: np.ndarray) -> slice:
+def between(trusted: np.ndarray) -> slice:
     """The slice from the first to the last trusted line. Outside it the input has no power and a simulated response means nothing."""
     found = np.flatnonzero(trusted)
     return slice(int(found[0]), int(found[-1]) + 1) if found.size else slice(None)
 
 
-def _range(figure: go.Figure, at: int, curves: list[FloatArray]) -> None:
+def fit_range(figure: go.Figure, at: int, curves: list[FloatArray]) -> None:
+    """Fit the range of a y axis to the finite values of these curves, with room at both ends."""
     values = np.concatenate([item[np.isfinite(item)] for item in curves])
     if values.size:
         room = max(0.06 * float(np.ptp(values)), 1.0)

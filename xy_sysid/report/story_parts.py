@@ -18,7 +18,7 @@ from xy_sysid.units import motion
 Document = Mapping[str, Any]
 
 AHEAD = "one sample ahead"  # in the label of a step whose error is a one-step prediction error, not one of a free simulation
-WIDE = 44  # maximum letters in a line of a legend
+WIDE, SENTENCE = 44, 47  # maximum letters in a line of a legend, and of a sentence
 NAMED, LINE = 3, 14  # labelled places per figure, and px per line of small text
 MARGIN = {"l": 8, "r": 10, "t": 30, "b": 8}
 SMALL = 220  # px, height of a figure of one row
@@ -57,27 +57,28 @@ def nothing(sentence: str, mode: str) -> go.Figure:
     figure = drawing([1.0], SMALL, mode)
     figure.update_xaxes(visible=False)
     figure.update_yaxes(visible=False)
-    figure.add_annotation(text=_wrapped(sentence), showarrow=False, xref="paper", yref="paper", x=0.5, y=0.5)
+    lines = textwrap.wrap(sentence, SENTENCE, break_long_words=False, break_on_hyphens=False)
+    figure.add_annotation(text="<br>".join(lines), showarrow=False, xref="paper", yref="paper", x=0.5, y=0.5)
     return figure
 
 
-def floor_line(figure: go.Figure, at: int = 1, level: float = 1.0, label: str = "noise floor") -> None:
+def floor_line(figure: go.Figure, at: int = 1, label: str = "noise floor") -> None:
     """Draw a horizontal line at the noise floor of a logarithmic axis, with one label at its left end."""
-    figure.add_hline(y=level, line={"color": FLOOR, "width": 1.5, "dash": "dot"}, row=at, col=1)
+    figure.add_hline(y=1.0, line={"color": FLOOR, "width": 1.5, "dash": "dot"}, row=at, col=1)
     figure.add_annotation(
-        text=label, x=0, y=np.log10(level), xref="x domain", yref=_axis("y", at), xanchor="left", yanchor="bottom", showarrow=False,
+        text=label, x=0, y=0.0, xref="x domain", yref=_axis("y", at), xanchor="left", yanchor="bottom", showarrow=False,
         font={"color": FLOOR, "size": 11},
     )  # fmt: skip
 
 
-def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0, at: int = 1) -> None:
+def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0) -> None:
     """Shade failing places and label the first NAMED with their size, each on its own line; ends: of the axis, in the document's unit."""
     low, high = ends
     for level, item in enumerate(places):
         first, last = max(float(item["from"]), low), min(float(item["to"]), high)
         if not last >= first:
             continue
-        stretches(figure, [(first * scale, last * scale)], fade(FAILS, 0.13), row=at, line={"color": fade(FAILS, 0.5), "width": 1})
+        stretches(figure, [(first * scale, last * scale)], fade(FAILS, 0.13), row=1, line={"color": fade(FAILS, 0.5), "width": 1})
         if level >= NAMED:
             continue
         middle = np.log10(np.sqrt(first * last) * scale) if log else 0.5 * (first + last) * scale
@@ -86,20 +87,20 @@ def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float,
         anchor = "left" if where < 0.25 else "right" if where > 0.75 else "center"
         text = f"fails: {number(float(item['error_over_floor']), 3)} × floor"
         figure.add_annotation(
-            text=text, x=float(middle), xref=_axis("x", at), y=1, yref=f"{_axis('y', at)} domain",
+            text=text, x=float(middle), xref="x", y=1, yref="y domain",
             yanchor="top", yshift=-LINE * level, xanchor=anchor, showarrow=False, font={"color": FAILS, "size": 11},
             hovertext=str(item["sentence"]),
         )  # fmt: skip
 
 
-def ratio_axis(figure: go.Figure, values: Sequence[FloatArray], title: str = "error / floor", at: int = 1) -> None:
+def ratio_axis(figure: go.Figure, values: Sequence[FloatArray], at: int = 1) -> None:
     """A log axis for errors divided by the noise floor. It always includes the floor and leaves room for labels above it."""
     known = np.concatenate([item[np.isfinite(item) & (item > 0)] for item in values]) if values else np.ones(1)
     low, high = (float(np.min(known)), float(np.max(known))) if known.size else (1.0, 1.0)
     bottom, top = np.log10(min(max(low, 0.03), 0.6)), np.log10(max(high, 3.0))
     figure.update_yaxes(
-        title_text=title, type="log", range=[bottom - 0.05, top + 0.25 * (top - bottom)], dtick="D2" if top - bottom < 1.6 else 1, tickformat="~g",
-        row=at, col=1,
+        title_text="error / floor", type="log", range=[bottom - 0.05, top + 0.25 * (top - bottom)], dtick="D2" if top - bottom < 1.6 else 1,
+        tickformat="~g", row=at, col=1,
     )  # fmt: skip
 
 
@@ -127,19 +128,10 @@ def shade_held_out(figure: go.Figure, document: Document, shown: Document, at: t
         )
 
 
-def grey(size: int = 4) -> dict[str, Any]:
+def grey() -> dict[str, Any]:
     """Marker style of untrusted values."""
-    return {"color": fade(UNTRUSTED, 0.75), "size": size, "symbol": "x-thin", "line": {"width": 1, "color": fade(UNTRUSTED, 0.75)}}
+    return {"color": fade(UNTRUSTED, 0.75), "size": 4, "symbol": "x-thin", "line": {"width": 1, "color": fade(UNTRUSTED, 0.75)}}
 
 
 def _axis(letter: str, number: int) -> str:
     return letter if number == 1 else f"{letter}{number}"
-
-
-def _wrapped(sentence: str, width: int = 46) -> str:
-    lines = [""]
-    for word in sentence.split():
-        if len(lines[-1]) + len(word) > width:
-            lines.append("")
-        lines[-1] += f" {word}" if lines[-1] else word
-    return "<br>".join(lines)

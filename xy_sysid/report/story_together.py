@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from xy_sysid.report.parts import band, broken, frequency_axis, outline, plain, positive, turns
-from xy_sysid.report.story_curves import stretches
+from xy_sysid.report.story_curves import between, stretches
 from xy_sysid.report.story_parts import Document, drawing, floor_line, nothing, pictured, ratio_axis, row, words
 from xy_sysid.report.theme import axis_colour
 from xy_sysid.samples.block import FloatArray
@@ -92,8 +92,7 @@ def _model(figure: go.Figure, entry: Entry, step: int, turn: float, line: dict[s
     if picture is None:
         return []
     measured, model = entry.document["measured"]["frequency_response"], picture["pictures"]["frequency_response"]
-    trusted = np.flatnonzero(np.array(measured["trusted"], dtype=bool))
-    inside = slice(int(trusted[0]), int(trusted[-1]) + 1) if trusted.size else slice(None)
+    inside = between(np.array(measured["trusted"], dtype=bool))
     frequency = row(measured["frequency"])[inside]
     name = f"{entry.name}: {words(str(picture['label']))}"
     for at, values in ((1, row(model["magnitude_db"]) + _lift(entry)), (2, row(model["phase_deg"]) + turn)):

@@ -6,7 +6,7 @@ Frozen results only; figures, tables and the page are made from them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from xy_sysid.fitting.of_recording import AxisEstimate, estimate, split, with_or
 from xy_sysid.fitting.structure import structure_from
 from xy_sysid.live.fitter import LIGHT_DAMPING, watched
 from xy_sysid.report.signals import Excitation, Motion, excitation, motion
-from xy_sysid.response.frf import FrequencyResponse
+from xy_sysid.response.frf import Z95, FrequencyResponse
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
 
@@ -67,7 +67,7 @@ class BeforeAfter:
         for name in ("antiresonance", "resonance"):
             was, now = getattr(self.before, name), getattr(self.after, name)
             if was is not None and now is not None:
-                half = 1.959963984540054 * math.hypot(was.sigma, now.sigma)
+                half = Z95 * math.hypot(was.sigma, now.sigma)
                 value = now.value - was.value
                 made.append(Shift(name, value, value - half, value + half))
         return tuple(made)
@@ -80,10 +80,10 @@ class AxisStudy:
     axis: str
     excitation: Excitation
     motion: Motion
-    estimate: AxisEstimate | None
-    fits: dict[str, Fit]
-    pair: Pair | None
-    change: BeforeAfter | None
+    estimate: AxisEstimate | None = None
+    fits: dict[str, Fit] = field(default_factory=dict)
+    pair: Pair | None = None
+    change: BeforeAfter | None = None
     problem: str = ""
     choice: Choice | None = None
 
@@ -101,19 +101,16 @@ def study_axis(
     period: as in ``offline.estimate``; loose: a second recording of the same machine, which is compared with the first.
     Without it, the two halves of the first are compared (not if ``refit`` is False).
     """
-    drive, moved = excitation(recording, axis), motion(recording, axis)
+    made = AxisStudy(axis=axis, excitation=excitation(recording, axis), motion=motion(recording, axis))
     try:
         found = estimate(recording, axis, settings, period)
-    except BadInput as problem:
-        return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=None, fits={}, pair=None, change=None, problem=str(problem))
-    try:
+        made = replace(made, estimate=found)
         settings, choice = with_orders(found.frf, settings)
         fits = three_fits(found.frf, structure_from(settings))
     except BadInput as problem:
-        return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=found, fits={}, pair=None, change=None, problem=str(problem))
-    pair = pair_of(fits["ML"])
+        return replace(made, problem=str(problem))
     change = before_after(recording, axis, settings, period, loose, fits["ML"]) if refit else None
-    return AxisStudy(axis=axis, excitation=drive, motion=moved, estimate=found, fits=fits, pair=pair, change=change, choice=choice)
+    return replace(made, fits=fits, pair=pair_of(fits["ML"]), change=change, choice=choice)
 
 
 def three_fits(frf: FrequencyResponse, structure: Structure) -> dict[str, Fit]:

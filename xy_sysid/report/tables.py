@@ -10,7 +10,7 @@ import numpy as np
 from xy_sysid.fitting import Fit, Interval
 from xy_sysid.fitting.model_orders import OrderTrial
 from xy_sysid.report.study import AxisStudy
-from xy_sysid.report.words import estimate_text, interval_parts, interval_text, number, root
+from xy_sysid.report.words import estimate_text, interval_parts, interval_text, number, root, superscript
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import over, readable
 
@@ -40,7 +40,7 @@ def coefficient_table(axis: str, fits: Mapping[str, Fit]) -> Table:
                 cells[2:] = _with_interval(item, factor)
             else:
                 cells.append("fixed")
-            rows.append((f"{letter}{_subscript(power)}  (s{_power(power)})", *cells))
+            rows.append((f"{letter}{_subscript(power)}  (s{superscript(power)})", *cells))
     delay = _named(ml, "delay")
     last = _with_interval(delay, 1e3) if delay else [number(ml.tf.delay * 1e3, 5), "fixed"]
     rows.append(("delay (ms)", "absorbed", "absorbed", *last))
@@ -137,10 +137,6 @@ def _together(text: str) -> str:
 def _coefficient(values: FloatArray, power: int) -> float:
     place = values.size - 1 - power
     return float(values[place]) if place >= 0 else 0.0
-
-
-def _power(power: int) -> str:
-    return str(power).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _subscript(power: int) -> str:

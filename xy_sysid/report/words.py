@@ -22,11 +22,12 @@ def number(value: float, digits: int = 4) -> str:
         if 1.0 <= abs(value) < LARGE:
             return f"{float(text):.0f}".replace("-", "−")
         mantissa, _, exponent = text.partition("e")
-        text = f"{mantissa}·10{_superscript(int(exponent))}"
+        text = f"{mantissa}·10{superscript(int(exponent))}"
     return text.replace("-", "−")
 
 
-def _superscript(value: int) -> str:
+def superscript(value: int) -> str:
+    """A whole number in raised digits."""
     return str(value).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
@@ -36,10 +37,10 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
     return f"{number(value * scale, digits)} {shown}".rstrip()
 
 
-def moved(value: float, unit: str, digits: int = 4) -> str:
+def moved(value: float, unit: str) -> str:
     """A motion or speed in its display unit."""
     scale, shown = motion(unit)
-    return f"{number(value * scale, digits)} {shown}"
+    return f"{number(value * scale, 3)} {shown}"
 
 
 def possible(name: str, figures: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -72,7 +73,7 @@ def interval_parts(value: float, low: float, high: float) -> tuple[str, str, str
     exponent = math.floor(math.log10(size)) if size >= LARGE or size < TINY else 0
     decimals = min(max(1 - math.floor(math.log10(half)) + exponent, 0), 9)
     value_text, low_text, high_text = (f"{each / 10.0**exponent:.{decimals}f}".replace("-", "−") for each in (value, low, high))
-    return value_text, low_text, high_text, f"·10{_superscript(exponent)}" if exponent else ""
+    return value_text, low_text, high_text, f"·10{superscript(exponent)}" if exponent else ""
 
 
 def interval_text(value: float, low: float, high: float, unit: str, name: str = "") -> str:
@@ -88,8 +89,8 @@ def estimate_text(item: Interval) -> str:
     return interval_text(item.value, item.low, item.high, item.unit, item.name)
 
 
-def root(value: complex, digits: int = 4) -> str:
+def root(value: complex) -> str:
     """One root, or a conjugate pair as a ± bj."""
     if value.imag == 0:
-        return number(value.real, digits)
-    return f"{number(value.real, digits)} ± {number(abs(value.imag), digits)}j"
+        return number(value.real, 4)
+    return f"{number(value.real, 4)} ± {number(abs(value.imag), 4)}j"

@@ -26,10 +26,7 @@ BANDS = 24  # number of bands for averaging the coupling
 ALIKE = 0.95  # coherence of the two inputs from which their effects cannot be separated
 FEWEST = 4.0  # minimum number of independent windows
 LONGER = 4  # window length relative to that of one axis: lines are averaged in bands, and leakage of the axis's own response is smaller
-COMBINED = {
-    "corexy": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
-    "gantry": (np.array([[1.0, 1.0], [1.0, -1.0]]), np.array([[0.5, 0.5], [0.5, -0.5]])),
-}  # (inputs, outputs) -> mean and difference: x and y of a CoreXY's two motors, travel and yaw of a gantry's two sides
+COMBINED = {"corexy": ("x", "y"), "gantry": ("travel", "yaw")}  # names of mean and difference: of a CoreXY's two motors, of a gantry's two sides
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -159,8 +156,9 @@ def coupling(recording: Recording, shape: WindowShape, band: tuple[float, float]
         raise BadInput("axes of the recording", ", ".join(recording.axes), "two", "Record both axes at once, each with a signal of its own.")
     if combine and combine not in COMBINED:
         raise BadInput("combine", repr(combine), ", ".join(COMBINED), "Choose one of these.")
-    drives, moves = COMBINED.get(combine, (np.eye(2), np.eye(2)))
-    names = {"corexy": ("x", "y"), "gantry": ("travel", "yaw")}.get(combine, recording.axes[:2])
+    drives = np.array([[1.0, 1.0], [1.0, -1.0]]) if combine else np.eye(2)
+    moves = 0.5 * drives if combine else drives
+    names = COMBINED.get(combine, recording.axes[:2])
     u, y = recording.voltage[:, :2] @ drives.T, recording.position[:, :2] @ moves.T
     spectra = _of_recording(recording, u, y, shape)
     return coupling_of(spectra, shape, recording.sampling_rate, band, (names[0], names[1]), recording.measured == "position")

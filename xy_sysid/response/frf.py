@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,16 +28,7 @@ def _algebra(name: str) -> Callable[..., FrequencyResponse]:
     return found
 
 
-def _one() -> FloatArray:
-    return np.ones(1)
-
-
-def _zero() -> FloatArray:
-    return np.zeros(1)
-
-
-def _none() -> FloatArray:
-    return np.zeros(0)
+_one, _zero, _none = partial(np.ones, 1), partial(np.zeros, 1), partial(np.zeros, 0)
 
 
 @dataclass(frozen=True, slots=True)

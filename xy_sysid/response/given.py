@@ -32,16 +32,13 @@ class Known:
     sampling_rate: float | None = None
 
 
-def given_response(
-    frequency: Any, response: Any, known: Known, units: tuple[str, str] = ("in", "out"), origin: Origin | None = None
-) -> FrequencyResponse:
+def given_response(frequency: Any, response: Any, known: Known, units: tuple[str, str], origin: Origin) -> FrequencyResponse:
     """A frequency response from arrays.
 
     frequency: (m,) Hz; response: (m,) complex; units: of input and output; origin: axis and notes
     Without sigma, and without a coherence with its averages, sigma is the scatter of each line about its neighbours.
     Raises BadInput for arrays that do not fit together or are too short.
     """
-    origin = origin or Origin()
     try:
         f = np.asarray(frequency, dtype=np.float64).ravel()
         h = np.asarray(response, dtype=np.complex128).ravel()

@@ -20,7 +20,7 @@ from functools import lru_cache
 import numpy as np
 
 from xy_sysid.response.frf import ComplexArray, FrequencyResponse
-from xy_sysid.response.h1 import MARGIN, H1Options, divisor
+from xy_sysid.response.h1 import EXCITED, MARGIN, STRONG, H1Options, divisor
 from xy_sysid.response.spectra import State
 from xy_sysid.response.windows import Window, WindowShape
 from xy_sysid.samples.block import FloatArray
@@ -28,8 +28,6 @@ from xy_sysid.samples.block import FloatArray
 ORDER = 2  # order of both polynomials
 POLES = 2  # order of the local rational method's denominator
 SIDE = 6  # lines to each side: 13 lines for the 6 unknowns of a single window, or 8 of the rational method
-EXCITED = 1e-3  # a line is excited if the power around it is above this fraction of the strong lines' power
-STRONG = 0.9  # quantile of the input power in the band that counts as strong
 CORRELATED = 0.02  # a smaller correlation of two lines' errors is neglected
 
 

@@ -12,51 +12,52 @@ LIKENESS = 0.98  # least correlation of the input with itself one period later; 
 OFF_WHOLE = 0.1  # of a sample: largest error of the period; over five windows less than half a sample
 TONE, TONES = 0.1, 8  # least size of a tone relative to the largest, and least number of tones for half periods
 FEWEST = 2  # least periods
+SHORTEST = 16  # samples of a period
 
 
-def find_period(u: FloatArray, shortest: int = 16) -> int | None:
+def find_period(u: FloatArray) -> int | None:
     """Period of a (n,) input in samples, or None if there are fewer than two.
 
     It is the first peak of the autocorrelation, checked and refined on the samples.
     """
     signal = u - u.mean()
-    number = signal.shape[0]
-    power = float(np.dot(signal, signal))
-    if number < FEWEST * shortest or power == 0.0:
-        return None
-    size = scipy.fft.next_fast_len(2 * number, real=True)
-    correlation = scipy.fft.irfft(np.abs(scipy.fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
-    overlap = 1.0 - np.arange(correlation.shape[0]) / number
-    alike = correlation / (power * overlap)
+    alike = _likenesses(signal)
     below = np.flatnonzero(alike < 0.5)
     if below.size == 0:
         return None
-    start = max(int(below[0]), shortest)
+    start = max(int(below[0]), SHORTEST)
     peaks = np.flatnonzero(alike[start:] > LIKENESS - 0.05) + start
     if peaks.size == 0:
         return None
-    near = np.arange(max(int(peaks[0]) - 2, 1), min(int(peaks[0]) + 64, number // FEWEST) + 1)
+    near = np.arange(max(int(peaks[0]) - 2, 1), min(int(peaks[0]) + 64, signal.shape[0] // FEWEST) + 1)
     exact = [likeness(signal, int(lag)) for lag in near]
     best = int(np.argmax(exact))
     return int(near[best]) if exact[best] > LIKENESS and _whole(signal, int(near[best])) else None
 
 
-def find_half_period(u: FloatArray, shortest: int = 16) -> int | None:
+def find_half_period(u: FloatArray) -> int | None:
     """Samples after which a (n,) input repeats with the opposite sign, as an odd multisine after half its period; None if there are fewer than two.
 
     None also for an input of a few tones, like a sine: for these half periods are no better than windows.
     """
     signal = u - u.mean()
-    number, power = signal.shape[0], float(np.dot(signal, signal))
-    if number < FEWEST * shortest or power == 0.0:
+    alike = _likenesses(signal)
+    if alike.size == 0:
         return None
-    size = scipy.fft.next_fast_len(2 * number, real=True)
-    correlation = scipy.fft.irfft(np.abs(scipy.fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
-    alike = correlation / (power * (1.0 - np.arange(correlation.shape[0]) / number))
-    half = int(np.argmin(alike[shortest:])) + shortest
-    tones = _odd_lines(signal[:half])
+    half = int(np.argmin(alike[SHORTEST:])) + SHORTEST
+    tones = np.abs(scipy.fft.rfft(np.concatenate((signal[:half], -signal[:half]))))[1::2]  # odd lines of the whole period
     several = int(np.sum(tones > TONE * tones.max())) >= TONES
     return half if several and likeness(signal, half) < -LIKENESS else None
+
+
+def _likenesses(signal: FloatArray) -> FloatArray:
+    """Correlation of a (n,) signal of mean 0 with itself 0, 1, .. n / FEWEST samples later; (0,) for one that is too short or constant."""
+    number, power = signal.shape[0], float(np.dot(signal, signal))
+    if number < FEWEST * SHORTEST or power == 0.0:
+        return np.zeros(0)
+    size = scipy.fft.next_fast_len(2 * number, real=True)
+    correlation = scipy.fft.irfft(np.abs(scipy.fft.rfft(signal, size)) ** 2, size)[: number // FEWEST + 1]
+    return np.asarray(correlation / (power * (1.0 - np.arange(correlation.shape[0]) / number)))
 
 
 def one_more(u: FloatArray, y: FloatArray, period: int) -> tuple[FloatArray, FloatArray]:
@@ -66,7 +67,7 @@ def one_more(u: FloatArray, y: FloatArray, period: int) -> tuple[FloatArray, Flo
     return np.append(u, u[-period]), np.append(y, y[-1] + y[-period] - y[-period - 1])
 
 
-def half_periods(u: FloatArray, y: FloatArray, half: int, differenced: bool = True) -> list[tuple[int, FloatArray, FloatArray]]:
+def half_periods(u: FloatArray, y: FloatArray, half: int, differenced: bool) -> list[tuple[int, FloatArray, FloatArray]]:
     """(counter, input, output) of each half period (n,) followed by its negative: a whole period without leakage.
 
     differenced: True to negate the steps of the output instead, with one more sample for its differences
@@ -86,11 +87,6 @@ def half_periods(u: FloatArray, y: FloatArray, half: int, differenced: bool = Tr
         inputs, moved = np.concatenate((u[rows], -u[rows], u[rows][:1])), np.concatenate((steps[rows], -steps[rows]))
         pieces.append((2 * half * number, inputs, np.concatenate(([0.0], np.cumsum(moved)))))
     return pieces
-
-
-def _odd_lines(part: FloatArray) -> FloatArray:
-    """Magnitudes of the odd lines of the period that consists of this part (n,) and its negative."""
-    return np.asarray(np.abs(scipy.fft.rfft(np.concatenate((part, -part))))[1::2])
 
 
 def _whole(signal: FloatArray, period: int) -> bool:
