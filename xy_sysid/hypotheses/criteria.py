@@ -43,11 +43,11 @@ DOUBTFUL = _number("doubtful", 0.1, "1", "a rival is mentioned if it predicts as
 SIZE = _number("size", 0.7, "1", "least size of an effect; an unmodelled force could imitate a smaller one")
 RICHER = _number("richer", 0.25, "1", "least size of a richer law compared with the simpler one that it replaces")
 WIDTH = _number("width", 6, "moves", "most replacements, and most pairs, from one set; the true one was among the first four")
-ALMOST = _number(
-    "almost", 0.7, "1", "two gains or sizes of a higher ratio count as equal: dry friction is named first, and a pair adds nothing"
-)
+ALMOST = _number("almost", 0.7, "1", "two gains or sizes of a higher ratio count as equal: dry friction is named first, and a pair adds nothing")
 OPTIMISM = _number("optimism", 3.0, "1", "a fit gains at most this multiple of its first-order prediction")
-HOPELESS = _number("hopeless", 1.5, "nats a line", "a fit to part of the data stops if it is this far behind after one round; no such fit came near the best")
+HOPELESS = _number(
+    "hopeless", 1.5, "nats a line", "a fit to part of the data stops if it is this far behind after one round; no such fit came near the best"
+)
 NEAR = _number("near", 0.03, "1", "a set whose score on part of the data is within this part of the best gain is fitted to all data")
 AT_FLOOR = _number("at the floor", 0.2, "nats a line", "below this the error is noise; clean axes have 0.03, the weakest effects 1")
 LEAST = _number("least one step ahead", 0.03, "nats", "least gain in log error power; repeated fits agree within 0.02")
