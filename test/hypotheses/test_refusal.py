@@ -7,10 +7,14 @@ from dataclasses import replace
 import pytest
 from helpers.simulated import recorded
 
+from xy_sysid.axis.linear_part import resonance
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
+from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.hypotheses.refusal import at_bound, refusal
+
+SPLIT = Estimate(name="screw_compliance.split", value=1.0, unit="", low=0.9, high=1.1)
 
 
 @pytest.fixture(scope="module")
@@ -32,3 +36,14 @@ def test_a_size_with_a_sign_has_two_bounds(side: str, refused: bool, data: AxisD
     assert at_bound(item, rate) is refused
     why = "gain_drift: rate is at its bound" if refused else ""
     assert refusal(data, STANDARD, ending(data, rate)) == why
+
+
+@pytest.mark.parametrize(("split", "refused"), [(0.3, False), (5.0, True)])
+def test_a_resonance_above_the_excited_band_does_not_count_wherever_its_antiresonance_is(split: float, refused: bool, data: AxisData) -> None:
+    """Only its zeros would show, and these imitate a lag of the amplifier. The antiresonance at 300 Hz is inside the band."""
+    base = fit_base(data)
+    values = (split, 300.0, 0.08, 0.15)
+    assert resonance(STANDARD["screw_compliance"], values) == pytest.approx(300.0 * (1.0 + split), rel=1e-3)
+    bent = replace(base, model=base.model.with_effect("screw_compliance", values), is_screening=True, parameters=(*base.parameters, SPLIT))
+    why = refusal(data, STANDARD, bent)
+    assert why.startswith("screw_compliance: a mode at 1.8e+03 Hz, outside the excited band") if refused else why == ""

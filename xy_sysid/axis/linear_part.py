@@ -42,6 +42,12 @@ def sections(model: AxisModel, sampling_rate: float) -> tuple[tuple[float, ...],
     return tuple(tuple(law(**_bound(law, effect, values, {"fs": sampling_rate}))) for law, effect, values in laws)
 
 
+def resonance(effect: Effect, values: tuple[float, ...]) -> float:
+    """Hz, natural frequency of the poles of a resonance: above its ``mode_frequency`` if that is the antiresonance."""
+    bottom = _section(effect, values)[1]
+    return math.pow(float(bottom[0]), -1.0 / (len(bottom) - 1)) / (2.0 * math.pi)
+
+
 def _section(effect: Effect, values: tuple[float, ...]) -> tuple[Any, Any]:
     """Numerator and denominator with gain 1 at 0 Hz; 1 and 1 for a nonlinear effect."""
     if effect.category == "motion":

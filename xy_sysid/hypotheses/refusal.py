@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from xy_sysid.axis.linear_part import resonance
 from xy_sysid.axis.model import Library
 from xy_sysid.effects import Effect, Parameter
 from xy_sysid.greybox.axis_data import AxisData
@@ -32,8 +33,10 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozense
                 return f"{name}: {item.name} is at its bound"
             if k == 0 and _is_none(data, effect, found):
                 return f"{name}: {item.name} cannot be distinguished from 0"
-            if item.name == effect.mode_frequency and not low <= value <= high:
-                return f"{name}: a mode at {value:.3g} Hz, outside the excited band ({low:.3g} to {high:.3g} Hz)"
+            if item.name == effect.mode_frequency:
+                outside = [hertz for hertz in (value, resonance(effect, values)) if not low <= hertz <= high]
+                if outside:
+                    return f"{name}: a mode at {outside[0]:.3g} Hz, outside the excited band ({low:.3g} to {high:.3g} Hz)"
     limit = data.first / data.sampling_rate / 4.0
     if found.model.delay >= 0.99 * limit:
         return f"time_delay: {found.model.delay:.3g} s is at its bound"
