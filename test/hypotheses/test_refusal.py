@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from helpers.simulated import recorded
 
 from xy_sysid.axis.linear_part import resonance
-from xy_sysid.axis.model import STANDARD
+from xy_sysid.axis.model import STANDARD, AxisModel, Library
+from xy_sysid.effects._contract import law
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
 from xy_sysid.greybox.parameters import Estimate
@@ -47,3 +49,20 @@ def test_a_resonance_above_the_excited_band_does_not_count_wherever_its_antireso
     bent = replace(base, model=base.model.with_effect("screw_compliance", values), is_screening=True, parameters=(*base.parameters, SPLIT))
     why = refusal(data, STANDARD, bent)
     assert why.startswith("screw_compliance: a mode at 1.8e+03 Hz, outside the excited band") if refused else why == ""
+
+
+@pytest.mark.parametrize(("b0", "a1", "a2"), [(1.0, 0.0, 0.0), (1.0, -3.0, 2.5), (1.0, -2.5, 1.0), (np.nan, np.nan, np.nan)])
+def test_a_law_of_a_user_without_a_resonance_is_refused_in_words(b0: float, a1: float, a2: float, data: AxisData) -> None:
+    """No poles, unstable poles as a pair and on either side of 1, and no numbers."""
+
+    @law
+    def section(split: float) -> tuple[float, float, float, float, float]:
+        return b0, 0.0, 0.0, a1, a2
+
+    own = replace(STANDARD["base_resonance"], name="shaky", functions={"section": section}, guesses=None, joint=None, family="")
+    library = Library([own])
+    base = fit_base(data)
+    model = AxisModel(base.model.gain, base.model.delay, base.model.pole, library=library).with_effect("shaky", (0.3, 100.0, 0.02, 0.02))
+    split = replace(SPLIT, name="shaky.split")
+    bent = replace(base, model=model, is_screening=True, parameters=(*base.parameters, split))
+    assert refusal(data, library, bent).startswith("shaky: a mode at ")

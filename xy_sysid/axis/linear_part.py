@@ -43,9 +43,16 @@ def sections(model: AxisModel, sampling_rate: float) -> tuple[tuple[float, ...],
 
 
 def resonance(effect: Effect, values: tuple[float, ...]) -> float:
-    """Hz, natural frequency of the poles of a resonance: above its ``mode_frequency`` if that is the antiresonance."""
-    bottom = _section(effect, values)[1]
-    return math.pow(float(bottom[0]), -1.0 / (len(bottom) - 1)) / (2.0 * math.pi)
+    """Hz, natural frequency of the poles of a resonance: above its ``mode_frequency`` if that is the antiresonance.
+
+    A user's law may have no poles, or give no numbers: NaN.
+    """
+    try:
+        bottom = _section(effect, values)[1]
+    except np.linalg.LinAlgError:
+        return math.nan
+    order = len(bottom) - 1
+    return math.pow(abs(float(bottom[0])), -1.0 / order) / (2.0 * math.pi) if order else math.nan
 
 
 def _section(effect: Effect, values: tuple[float, ...]) -> tuple[Any, Any]:
