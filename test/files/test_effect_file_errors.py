@@ -8,6 +8,7 @@ import pytest
 from helpers.cli_tools import cli, npz
 
 from campaigns.faults.strange import GOOD_EFFECT as GOOD
+from xy_sysid.files import blame
 
 LOADED = {
     "exit": ("import sys\n\nsys.exit(3)\n", 3, "SystemExit: 3"),
@@ -62,6 +63,13 @@ def test_an_error_while_its_functions_are_used(name: str, tmp_path: Path) -> Non
     said = cli("refine", npz(tmp_path / "rec.npz", rows=8000), "--effect-file", file, "--add", "own_drag")
     assert said.code == 2 and said.out == "" and said.err.count("\n") == 1, said
     assert f"effect file {file}, line {line} is {words}" in said.err, said.err
+
+
+@pytest.mark.parametrize(("bold", "plain"), [("", ""), ("\x1b[1m", "\x1b[0m")])
+def test_the_cause_is_found_in_a_message_of_numba_with_colours_and_without(bold: str, plain: str) -> None:
+    """With colorama installed numba writes in bold."""
+    words = f"{bold}No implementation of <function force at 0x7f96b27791c0>:{plain}\n  {bold}NameError: name 'gone' is not defined{plain}\n"
+    assert blame._said(ValueError(words)) == "NameError: name 'gone' is not defined"
 
 
 WRONG = {

@@ -14,6 +14,7 @@ from types import FunctionType, TracebackType
 from xy_sysid.errors import BadInput, XySysidError
 
 LAW = re.compile(r"<function \S+ at 0x([0-9a-fA-F]+)>")  # in numba's message on a law that it cannot compile
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")  # numba colours its messages if colorama is installed
 CAUSE = re.compile(r"^\s*(\w+Error: .+)$", re.MULTILINE)
 _files: set[str] = set()
 _loaded: list[Path] = []  # in the order of loading, repeated if loaded again
@@ -72,7 +73,7 @@ def _law(words: str) -> tuple[str, int] | None:
 
 def _said(error: BaseException) -> str:
     """The message of an error in one line; of numba's many lines, the one with the cause."""
-    words = str(error.msg) if isinstance(error, SyntaxError) else str(error)
+    words = COLOUR.sub("", str(error.msg) if isinstance(error, SyntaxError) else str(error))
     causes = [cause for cause in CAUSE.findall(words) if "Failed in" not in cause]
     first = next((line.strip() for line in words.splitlines() if line.strip()), "")
     return causes[-1] if causes and LAW.search(words) else f"{type(error).__name__}: {first}".rstrip(": ")
