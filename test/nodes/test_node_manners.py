@@ -13,7 +13,7 @@ import pytest
 from helpers import ROOT
 from helpers.busy import allowed
 from helpers.cli_tools import bare
-from helpers.live_nodes import FAST, Source, newest
+from helpers.live_nodes import FAST, Source, newest, ready
 from helpers.ros_tools import Integrator, World, needs_ros
 
 from xy_sysid.errors import BadInput
@@ -113,6 +113,7 @@ def test_topics_that_are_remapped_go_on_working(world: World) -> None:
     statuses = world.statuses("told")
     world.start(BALLSCREW, {"machine": "rigid.yaml"}, arguments=names)
     world.start(IDENTIFIER, QUICK, arguments=names)
+    ready(world, statuses, "ballscrew", "streams")  # connected with this subscriber, which would miss the fits of a quick signal
     world.start(EXCITATION, {**FAST, "autostart": True, "renamed": True}, arguments=names)
     assert world.until(lambda: int(newest(statuses, "axis x").get("windows", "0")) > 20, 60.0)
     assert float(newest(statuses, "axis x")["relative error (1)"]) < 0.05
