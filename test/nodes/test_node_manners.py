@@ -98,8 +98,9 @@ def test_two_tables_in_two_namespaces_are_told_apart(world: World) -> None:
         where = ["-r", f"__ns:={space}"]
         world.start(BALLSCREW, {"machine": "rigid.yaml"}, arguments=where)
         world.start(IDENTIFIER, QUICK, arguments=where)
-    world.start(EXCITATION, {**FAST, "autostart": True}, arguments=["-r", "__ns:=/left"])
     names = {f"{space}/{name}" for space in ("left", "right") for name in ("ballscrew", "identifier: streams")}
+    assert world.until(lambda: names <= set(heard), 60.0), sorted(heard)
+    world.start(EXCITATION, {**FAST, "autostart": True}, arguments=["-r", "__ns:=/left"])
     names |= {"left/excitation", "left/identifier: axis x"}
     assert world.until(lambda: names <= set(heard) and streams("left") > 0, 60.0), sorted(heard)
     assert {one.hardware_id for one in heard.values()} == {"left", "right"}
