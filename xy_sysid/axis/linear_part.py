@@ -18,6 +18,7 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.units import USUAL, Units
 
 FINE = 1e5  # Hz at which the roots of a section are computed: far above any resonance, where s = ln(z) fs is accurate enough
+ROUNDING = 1e-3  # relative to a pole, above its imaginary part by rounding: a double root at 1 Hz has 2.5e-4
 STEP = 1e-5  # s, step for the test of a lag
 
 
@@ -43,16 +44,16 @@ def sections(model: AxisModel, sampling_rate: float) -> tuple[tuple[float, ...],
 
 
 def resonance(effect: Effect, values: tuple[float, ...]) -> float:
-    """Hz, natural frequency of the poles of a resonance: above its ``mode_frequency`` if that is the antiresonance.
+    """Hz, at which the poles of a resonance oscillate: above its ``mode_frequency`` if that is the antiresonance.
 
-    A user's law may have no poles, or give no numbers: NaN.
+    NaN if nothing oscillates: overdamped poles, and a user's law without poles or numbers.
     """
     try:
-        bottom = _section(effect, values)[1]
+        poles = np.roots(_section(effect, values)[1])
     except np.linalg.LinAlgError:
         return math.nan
-    order = len(bottom) - 1
-    return math.pow(abs(float(bottom[0])), -1.0 / order) / (2.0 * math.pi) if order else math.nan
+    swings = [abs(pole.imag) for pole in poles if abs(pole.imag) > ROUNDING * abs(pole)]
+    return max(swings, default=math.nan) / (2.0 * math.pi)
 
 
 def _section(effect: Effect, values: tuple[float, ...]) -> tuple[Any, Any]:
