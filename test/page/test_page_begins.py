@@ -22,7 +22,7 @@ pytestmark = [needs_browser, needs_ros]
 
 EVERY = 125  # ms between two frames, of one tab and then of the other
 STILL = 6.0  # px that a card may move
-SLOW = 0.15  # times real time, so that the page is open long before the verdict, also on a busy computer
+SLOW = 0.4  # times real time, so that the page is open long before the verdict, also on a busy computer
 SOON = 5.5  # s from 10 s of data to the verdict on the rigid model, on a quiet machine: 8 s from the first sample of the demo, which runs 4 times
 # faster than real time
 

@@ -71,8 +71,8 @@ def extended(data: AxisData, base: GreyboxFit, effect: Effect, demand: Demand | 
 
 
 def _has_an_effect(data: AxisData, fit: GreyboxFit, found: FilterFit) -> bool:
-    """Whether the same filter without the effect has a clearly larger held-out error; otherwise the effect is absent."""
-    return not found.given_up and 2.0 * log(error_without(data, found) / fit.held_out_error) >= LEAST
+    """Whether the effect is larger than the noise, and the same filter without it has a clearly larger held-out error; otherwise it is absent."""
+    return not found.given_up and not found.too_small and 2.0 * log(error_without(data, found) / fit.held_out_error) >= LEAST
 
 
 def _masked(data: AxisData, base: GreyboxFit, effect: Effect) -> Others:
