@@ -113,7 +113,7 @@ def test_curves_converge_live(scene: Scene) -> None:
     first, early = width(), windows()
     tab.until(lambda: windows() >= 2 * early + 4, 40, "no more windows")
     tab.until(lambda: 0 < width() < first, 10, f"the band does not narrow: {first} dB at first, now {width()} dB")
-    assert "windows received" in str(tab.page.locator("[data-part=windows]").text_content())
+    assert "windows in" in str(tab.page.locator("[data-part=windows]").text_content())
 
 
 def at_noise(worst: str) -> bool:

@@ -121,7 +121,7 @@ class Control:
             values = heard.values(f"axis {axis}")
             if "windows" in values:
                 data = float(values.get("seconds of data (s)", "0"))
-                rows.append((f"axis {axis}", f"{values['windows']} windows received in {seconds_text(data)}, dropped: {dropped_words(values)}"))
+                rows.append((f"axis {axis}", f"{values['windows']} windows in {seconds_text(data)}, dropped: {dropped_words(values)}"))
         if rows == getattr(self, "_rows", None):
             return
         self._rows = rows
