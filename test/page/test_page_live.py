@@ -49,7 +49,7 @@ class Scene:
         if "not configured" in state or "not there" in state:
             self.lifecycle("not configured")
             self.tab.press("configure")
-        self.lifecycle("nothing moves before Activate")
+        self.lifecycle("nothing moves yet")
         self.tab.until(self.tab.page.locator("[data-act=activate]").is_enabled)
         self.tab.press("activate")
         self.lifecycle("driving")
@@ -246,7 +246,7 @@ def test_stop_really_makes_the_excitation_inactive(scene: Scene, way: str) -> No
         """The page shows both; a message is shown for some seconds only, and may end before the other appears."""
         heard.append(tab.notices())
         lifecycle = str(tab.page.locator("[data-part=lifecycle]").text_content())
-        return "nothing moves before Activate" in lifecycle and any("stopped: the excitation is" in words for words in heard)
+        return "nothing moves yet" in lifecycle and any("stopped: the excitation is" in words for words in heard)
 
     tab.until(stopped, 15, lambda: f"{tab.page.locator('[data-part=lifecycle]').text_content()!r}, {set(heard)}")
     assert world.state("excitation") == "inactive" and scene.silent()

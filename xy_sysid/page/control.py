@@ -17,7 +17,7 @@ from xy_sysid.page.settings_form import SettingsForm
 
 STATES = {
     "active": "driving",
-    "inactive": "configured; nothing moves before Activate",
+    "inactive": "configured; nothing moves yet",
     "unconfigured": "not configured; nothing moves",
     "finalized": "shut down",
     "": "not there",
