@@ -30,7 +30,7 @@ story live control_design
 """)
 EDGE = names("""
 bags imports files processes fleets
-nodes report page cli front_door
+nodes report paper page cli front_door
 """)
 ORDER = [*CORE, *EDGE]
 ALONE = {"__init__", "__main__", "errors", "settings", "units", "jit", "tables"}  # files next to the packages

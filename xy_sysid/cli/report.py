@@ -12,7 +12,6 @@ from xy_sysid.cli import options as o
 from xy_sysid.cli.diagnose import Own
 from xy_sysid.cli.output import emit, progress, say
 from xy_sysid.cli.reading import chosen, read, reads
-from xy_sysid.cli.study import answer as linear_answer
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
@@ -92,8 +91,11 @@ def _coupled(found: Coupling | None) -> dict[str, Any] | None:
 
 def answer(one: AxisReport) -> dict[str, Any]:
     """One axis of the JSON document."""
+    from xy_sysid.report.fits_document import fits_document
+    from xy_sysid.report.remarks import axis_remarks
     from xy_sysid.report.story_words import status
 
+    linear = fits_document(one.study, axis_remarks(one.study))
     story = None if one.story is None else {name: value for name, value in one.story.items() if name not in ("steps", "measured")}
     verdicts = None if one.verdicts is None else {check.name: {"ok": check.ok, "sentence": check.sentence} for check in one.verdicts.verdicts}
-    return {"status": status(one.story), "problem": one.problem, "story": story, "linear": linear_answer(one.study), "checks": verdicts}
+    return {"status": status(one.story), "problem": one.problem, "story": story, "linear": linear, "checks": verdicts}

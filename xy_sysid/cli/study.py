@@ -15,7 +15,7 @@ from xy_sysid.files.provenance import provenance
 
 if TYPE_CHECKING:
     from xy_sysid.imports.reading import Reading
-    from xy_sysid.report.study import AxisStudy
+    from xy_sysid.paper.study import AxisStudy
     from xy_sysid.samples.recording import Recording
 
 
@@ -37,9 +37,10 @@ def study(
     """Repeat the study of the paper (figures 2-7, tables 1-2) on any recording, as one HTML page that opens offline."""
     from xy_sysid.bags.atomic import write_text
     from xy_sysid.errors import BadInput
+    from xy_sysid.paper.document import document
+    from xy_sysid.paper.study import study_axis
+    from xy_sysid.paper.study_page import study_page
     from xy_sysid.report.captions import summary
-    from xy_sysid.report.study import study_axis
-    from xy_sysid.report.study_page import study_page
 
     settings = o.settings_from(params, set_)
     samples = o.period_from(period)
@@ -66,7 +67,7 @@ def study(
     page = study_page(rec.name, studies, units, settings.min_coherence, origins, recording.notes)
     write_text(out, page)
     if json:
-        emit({"page": str(out), "bytes": len(page.encode()), "recordings": origins, "axes": {name: answer(one) for name, one in studies.items()}})
+        emit({"page": str(out), "bytes": len(page.encode()), "recordings": origins, "axes": {name: document(one) for name, one in studies.items()}})
         return
     for one in studies.values():
         say(summary(one))
@@ -74,34 +75,6 @@ def study(
         for note in one.estimate.notes if one.estimate else ():
             say(f"axis {one.axis}: {note}", aside)
     say(f"wrote {out}, {len(page.encode()) / 1e6:.1f} MB")
-
-
-def answer(one: AxisStudy) -> dict[str, Any]:
-    """One axis of the JSON document."""
-    from xy_sysid.report.remarks import axis_remarks
-
-    fits: dict[str, dict[str, Any]] = {
-        name: {
-            "converged": fit.converged,
-            "stable": fit.tf.is_stable,
-            "numerator": fit.tf.numerator,
-            "denominator": fit.tf.denominator,
-            "delay": fit.tf.delay if name == "ML" else None,
-            "relative_error": fit.relative_error,
-            "paper": {"error_cost": fit.error_cost, "confidence": fit.confidence},
-            "poles": fit.poles,
-            "zeros": fit.zeros,
-        }
-        for name, fit in one.fits.items()
-    }
-    if "ML" in one.fits:
-        ml = one.fits["ML"]
-        fits["ML"]["estimates"] = {item.name: {"value": item.value, "ci95": [item.low, item.high], "unit": item.unit} for item in ml.intervals}
-    change: dict[str, Any] | None = None
-    if one.change is not None:
-        moved = {shift.name: {"value": shift.value, "ci95": [shift.low, shift.high], "unit": "Hz"} for shift in one.change.shifts}
-        change = {"before": one.change.before_name, "after": one.change.after_name, "shift": moved, "problem": one.change.problem}
-    return {"problem": one.problem, "fits": fits, "change": change, "remarks": axis_remarks(one)}
 
 
 def _same_machine(first: Recording, second: Recording, names: tuple[str, ...]) -> None:

@@ -20,8 +20,8 @@ from xy_sysid.errors import BadInput
 from xy_sysid.fitting.of_recording import judged, split
 from xy_sysid.fitting.verdicts import Validation, validate
 from xy_sysid.greybox.axis_data import SHORTEST
+from xy_sysid.report.axis_fits import AxisFits, fit_axis
 from xy_sysid.report.signals import excitation, motion
-from xy_sysid.report.study import AxisStudy, study_axis
 from xy_sysid.samples.moves import several_moves
 from xy_sysid.samples.recording import Recording, Run
 from xy_sysid.settings import IdentifierSettings
@@ -46,7 +46,7 @@ class AxisReport:
     speed: rms of the measured speed, output unit / s; note: remarks for the reader on orders and length
     """
 
-    study: AxisStudy
+    study: AxisFits
     verdicts: Validation | None
     story: Mapping[str, Any] | None
     speed: float
@@ -107,12 +107,12 @@ def _report(recording: Recording, axis: str, wanted: Wanted, tell: Tell, fits: C
     return AxisReport(study=studied, verdicts=verdicts, story=story, speed=speed, problem=problem, note="; ".join(notes))
 
 
-def _studied(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None) -> tuple[AxisStudy, Validation | None]:
+def _studied(recording: Recording, axis: str, settings: IdentifierSettings, period: int | None) -> tuple[AxisFits, Validation | None]:
     training, unseen = split(recording, HELD_OUT)
     drive, moved = excitation(recording, axis), motion(recording, axis)
     try:
         with np.errstate(all="ignore"):  # an overflow gives a number that the verdicts judge
-            studied = replace(study_axis(training, axis, settings, period, refit=False), excitation=drive, motion=moved)
+            studied = replace(fit_axis(training, axis, settings, period), excitation=drive, motion=moved)
             if not studied.fits or studied.frf is None:
                 return studied, None
             judged(studied.frf)
@@ -121,7 +121,7 @@ def _studied(recording: Recording, axis: str, settings: IdentifierSettings, peri
         return replace(studied, fits={}, pair=None, problem=str(refusal)), None
     except (np.linalg.LinAlgError, ZeroDivisionError):
         problem = "The coefficients of the transfer function are too large for the computer. Lower the orders or widen the band."
-        return AxisStudy(axis=axis, excitation=drive, motion=moved, problem=problem), None
+        return AxisFits(axis=axis, excitation=drive, motion=moved, problem=problem), None
 
 
 def told(recording: Recording, axis: str, wanted: Wanted) -> Mapping[str, Any]:

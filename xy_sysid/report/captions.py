@@ -8,15 +8,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from xy_sysid.fitting import Fit
+from xy_sysid.report.axis_fits import AxisFits
 from xy_sysid.report.signals import Excitation, Motion
-from xy_sysid.report.study import AxisStudy, BeforeAfter
-from xy_sysid.report.words import estimate_text, interval_text, number, quantity
+from xy_sysid.report.words import estimate_text, number, quantity
 from xy_sysid.response.frf import FrequencyResponse
 
-INTRODUCTION = (
-    "Figures 2 to 7 and tables 1 and 2 of the frequency-domain study of a ball-screw XY table, for this recording: excitation, "
-    "motion, frequency response, and transfer functions with their uncertainty."
-)
 FITS = (
     "LLS and NLLS absorb the delay in their polynomials (the paper's method); ML models delay and hold. Top and middle: magnitude "
     "and phase. Bottom: relative error of each fit at each line. An error at the grey noise of the measurement cannot be reduced; "
@@ -29,7 +25,7 @@ COEFFICIENTS = (
 )
 
 
-def summary(one: AxisStudy) -> str:
+def summary(one: AxisFits) -> str:
     """The summary line at the top of the page."""
     if not one.fits:
         return f"Axis {one.axis}: {one.problem}"
@@ -106,29 +102,3 @@ def fit(axis: str, fits: Mapping[str, Fit]) -> str:
     each = ", ".join(f"{name} {number(one.error_cost, 3)} %" for name, one in fits.items())
     banded = "; shaded: 95 % band of the ML fit, widened by its error beyond noise" if math.isfinite(fits["ML"].misfit) else ""
     return f"Axis {axis}: fits over the measured response{banded}; relative error {each}."
-
-
-def change(axis: str, one: BeforeAfter) -> str:
-    """The caption of figure 7 for one axis."""
-    each = ", ".join(f"{s.name} {interval_text(s.value, s.low, s.high, 'Hz')}" for s in one.shifts)
-    return f"Axis {axis}: the pair in {one.before_name} and {one.after_name}; shift: {each or 'unknown'}."
-
-
-def pair_title(studies: Mapping[str, AxisStudy]) -> str:
-    """Heading of figure 7."""
-    found = [one.pair.resonance.value for one in studies.values() if one.pair is not None]
-    return f"the {number(float(np.mean(found)), 2)} Hz pair" if found else "antiresonance and resonance"
-
-
-def pair(studies: Mapping[str, AxisStudy]) -> str:
-    """Caption of figure 7."""
-    changes = [one.change for one in studies.values() if one.change is not None and (one.change.before or one.change.after)]
-    if not changes:
-        return "No lightly damped resonance was found in the band of this recording."
-    names = f"{changes[0].before_name} and {changes[0].after_name}"
-    second = " of this recording" if changes[0].before_name == "first half" else ", two recordings"
-    return (
-        "Antiresonance and resonance in detail, as velocity response (for an integrating axis, the response times jω). "
-        f"Dots with 95 % bars are measured, lines are fitted. Vertical lines and bands: both frequencies with intervals; {names}{second}. "
-        "Loose bolts of the base lower both frequencies. Bottom: the shift with its 95 % interval. If the bar crosses 0, no shift is proven."
-    )

@@ -1,4 +1,4 @@
-"""Figures 2 to 7 of the paper's study: numbers in, a Plotly figure out. One function per figure; no files, no fits."""
+"""Figures of signals, response and fits (2 to 6 of the paper): numbers in, a Plotly figure out. No files, no fits."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from xy_sysid.fitting import Fit
 from xy_sysid.fitting.model_band import model_band
 from xy_sysid.report.parts import band, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
 from xy_sysid.report.signals import Excitation, Motion
-from xy_sysid.report.study import BeforeAfter, Pair
-from xy_sysid.report.theme import AFTER, BEFORE, DRIFT, METHODS, axis_colour, fade
+from xy_sysid.report.theme import DRIFT, METHODS, axis_colour, fade
 from xy_sysid.response.frf import Z95, FrequencyResponse
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import over, readable
@@ -196,78 +195,10 @@ def _model_band(figure: go.Figure, fit: Fit, level: FloatArray, phase: FloatArra
         band(figure, row, outline(pieces, fit.frequency, middle - half, middle + half), colour, UNCERTAIN, name)
 
 
-def pair_figure(change: BeforeAfter) -> go.Figure:
-    """Figure 7, for one axis: the pair before and after, measured and fitted, with intervals; below, the shift in Hz."""
-    shifts = change.shifts
-    heights = [0.47, 0.28, 0.25] if shifts else [0.6, 0.4]
-    figure = rows(len(heights), shared=False, gap=0.11, heights=heights)
-    sides = [(change.before_name, change.before, BEFORE, "solid"), (change.after_name, change.after, AFTER, "dash")]
-    known = [(name, pair, colour, dash) for name, pair, colour, dash in sides if pair is not None]
-    low, high = _zoom([pair for _, pair, _, _ in known])
-    turned: float | None = None
-    for name, pair, colour, dash in known:
-        fit = pair.fit
-        chosen = (fit.frequency >= low) & (fit.frequency <= high)
-        frequency, measured, model = fit.frequency[chosen], fit.measured[chosen], fit.response[chosen]
-        factor = 2j * np.pi * frequency if fit.structure.power > 0 else np.ones_like(measured)
-        sigma = 1.0 / fit.weight[chosen] if fit.structure.weighting == "sigma" else np.zeros(frequency.size)
-        part = Z95 * sigma / np.sqrt(2) / np.abs(measured)
-        phase = phase_of(measured * factor)
-        if turned is not None and phase.size:
-            phase = phase + 360 * np.round((turned - np.mean(phase)) / 360)
-        turned = float(np.mean(phase)) if phase.size else turned
-        curves = (
-            (1, decibel(measured * factor, fit.tf.output_unit), 20 * np.log10(1 + part), decibel(model * factor, fit.tf.output_unit)),
-            (2, phase, np.degrees(part), phase + np.degrees(np.angle(model / measured))),
-        )
-        for row, points, half, curve in curves:
-            figure.add_scatter(
-                x=frequency, y=points, mode="markers", marker={"color": fade(colour, 0.8), "size": 4},
-                error_y={"type": "data", "array": half, "thickness": 1, "width": 0, "color": fade(colour, 0.6)},
-                name=f"{name}, measured", legendgroup=name, showlegend=row == 1, row=row, col=1,
-            )  # fmt: skip
-            figure.add_scatter(
-                x=frequency, y=curve, mode="lines", line={"color": colour, "width": 1.6, "dash": dash}, name=f"{name}, fit",
-                legendgroup=name, showlegend=row == 1, row=row, col=1,
-            )  # fmt: skip
-        for item in (pair.antiresonance, pair.resonance):
-            if item is not None:
-                for row in (1, 2):
-                    figure.add_vrect(x0=item.low, x1=item.high, line_width=0, fillcolor=fade(colour, 0.35), row=row, col=1)
-                    figure.add_vline(x=item.value, line={"color": colour, "width": 1, "dash": dash}, row=row, col=1)
-    if shifts:
-        figure.add_scatter(
-            x=[one.value for one in shifts], y=[one.name for one in shifts], mode="markers", marker={"color": METHODS["ML"], "size": 9},
-            error_x={"type": "data", "array": [one.high - one.value for one in shifts], "thickness": 2, "width": 6},
-            name="shift, 95 % interval", showlegend=False, row=3, col=1,
-        )  # fmt: skip
-        figure.add_vline(x=0, line={"color": METHODS["measured"], "width": 1}, row=3, col=1)
-        figure.update_xaxes(title_text=f"shift, {change.after_name} − {change.before_name} (Hz)", row=3, col=1)
-        figure.update_yaxes(range=[-0.6, len(shifts) - 0.4], row=3, col=1)
-    speed = bool(known) and known[0][1].fit.structure.power > 0
-    tf = known[0][1].fit.tf if known else None
-    ratio = over(f"{readable(tf.output_unit)[1]}{'/s' if speed else ''}", tf.input_unit) if tf is not None else ""
-    figure.update_yaxes(title_text=f"dB re {plain(ratio)}", row=1, col=1)
-    figure.update_yaxes(title_text="phase (°)", row=2, col=1)
-    figure.update_xaxes(title_text="", range=[low, high], matches="x", row=1, col=1)
-    figure.update_xaxes(title_text="frequency (Hz)", range=[low, high], matches="x", row=2, col=1)
-    figure.update_layout(height=640 if shifts else 480)
-    return figure
-
-
 def coherence_bottom(responses: Mapping[str, FrequencyResponse]) -> float:
     """Lower end of figure 5's axis: 0, or a round number below every line if all are coherent."""
     lowest = min((float(np.min(frf.coherence)) for frf in responses.values()), default=0.0)
     return float(np.floor(lowest * 10 - 0.5) / 10) if lowest > 0.5 else 0.0
-
-
-def _zoom(pairs: list[Pair]) -> tuple[float, float]:
-    """(lowest, highest) Hz around all antiresonances and resonances, with a margin of at least a third of the frequency on each side."""
-    found = [item.value for pair in pairs for item in (pair.antiresonance, pair.resonance) if item is not None]
-    if not found:
-        return 0.0, 1.0
-    room = max(0.35 * min(found), 1.5 * (max(found) - min(found)))
-    return max(min(found) - room, 0.3 * min(found)), max(found) + room
 
 
 def _ratio(frf: FrequencyResponse) -> str:

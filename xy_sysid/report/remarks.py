@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from xy_sysid.fitting import Fit
-from xy_sysid.report.study import AxisStudy
+from xy_sysid.report.axis_fits import AxisFits
 from xy_sysid.report.tables import roots_text
-from xy_sysid.report.words import estimate_text, interval_text, number
+from xy_sysid.report.words import number
 from xy_sysid.response.frf import ComplexArray
 
 MUCH_BETTER = 3.0  # factor between the errors above which the missing delay is named as the reason
@@ -16,14 +16,9 @@ NOT_A_CONFIDENCE = (
     "interval and gives no uncertainty of a parameter. The brackets in the tables are 95 % confidence intervals from the variance "
     "of the measurement."
 )
-PRINTED = (
-    "The NLLS denominators printed in the paper have negative coefficients. Taken literally they are unstable, with a pole far "
-    "above the measured band. They describe the response in the band, not the machine."
-)
-PAPER_VALUES = "For comparison, the paper reports errors of 39 % (LLS) and 11 % (NLLS), and delays of 1.29 ms (x) and 1.38 ms (y)."
 
 
-def axis_remarks(one: AxisStudy) -> list[str]:
+def axis_remarks(one: AxisFits) -> list[str]:
     """What a reader should know about the fits of one axis."""
     made = [f"Axis {one.axis}: {one.problem}"] if one.problem else []
     made += [f"Axis {one.axis}: {note}" for note in (one.estimate.notes if one.estimate else ())]
@@ -32,12 +27,10 @@ def axis_remarks(one: AxisStudy) -> list[str]:
     made += _delay(one)
     for name, fit in one.fits.items():
         made += _fit(one.axis, name, fit)
-    if one.change is not None:
-        made += _change(one)
     return made
 
 
-def _delay(one: AxisStudy) -> list[str]:
+def _delay(one: AxisFits) -> list[str]:
     nlls, ml = one.fits["NLLS"], one.fits["ML"]
     if not ml.converged or nlls.error_cost < MUCH_BETTER * ml.error_cost:
         return []
@@ -72,31 +65,3 @@ def poles_outside(fit: Fit) -> ComplexArray:
     frequency = np.abs(fit.poles) / (2 * np.pi)
     outside = (np.abs(fit.poles) > 0) & ((frequency < fit.frequency[0]) | (frequency > fit.frequency[-1]))
     return np.asarray(fit.poles[outside], dtype=np.complex128)
-
-
-def _change(one: AxisStudy) -> list[str]:
-    change = one.change
-    if change is None:
-        return []
-    made = [f"Axis {one.axis}, {change.problem}"] if change.problem else []
-    for pair, name in ((change.before, change.before_name), (change.after, change.after_name)):
-        if pair is not None and pair.fit.consistent is False and one.fits["ML"].consistent is not False:
-            made.append(
-                f"Axis {one.axis}, {name}: the model misses something in this part. The machine may have changed during the recording, "
-                f"so that {estimate_text(pair.resonance)} is a mean."
-            )
-    for shift in change.shifts:
-        direction = "left (down)" if shift.value < 0 else "right (up)"
-        if not shift.certain:
-            continue
-        size = interval_text(shift.value, shift.low, shift.high, "Hz")
-        text = f"Axis {one.axis}: the {shift.name} moved {direction} from {change.before_name} to {change.after_name}: {size}."
-        if any(pair is not None and pair.fit.consistent is False for pair in (change.before, change.after)):  # the error exceeds the noise
-            text += (
-                " The model error exceeds the noise, and the interval includes noise only. A shift that is small compared with the spacing of "
-                "the lines may not be a change of the machine."
-            )
-        made.append(text)
-    if change.shifts and not any(shift.certain for shift in change.shifts):
-        made.append(f"Axis {one.axis}: the shift of the pair is within its interval.")
-    return made

@@ -9,8 +9,8 @@ import numpy as np
 
 from xy_sysid.fitting import Fit, Interval
 from xy_sysid.fitting.model_orders import OrderTrial
-from xy_sysid.report.study import AxisStudy
-from xy_sysid.report.words import estimate_text, interval_parts, interval_text, number, root, superscript
+from xy_sysid.report.axis_fits import AxisFits
+from xy_sysid.report.words import estimate_text, interval_parts, number, root, superscript
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import over, readable
 
@@ -48,7 +48,7 @@ def coefficient_table(axis: str, fits: Mapping[str, Fit]) -> Table:
     return Table(caption, ("coefficient", "LLS", "NLLS", "ML", "ML, 95 % interval"), tuple(rows))
 
 
-def result_table(one: AxisStudy) -> Table:
+def result_table(one: AxisFits) -> Table:
     """Table 2, for one axis: errors, the paper's confidence measure, and the physical parameters with their intervals."""
     fits = one.fits
     ml = fits["ML"]
@@ -87,26 +87,10 @@ def order_table(axis: str, tried: Sequence[OrderTrial], fit: Fit) -> Table | Non
     return Table(caption, ("zeros / poles", "parameters", judged, "MDL above minimum (nats)"), tuple(rows))
 
 
-def change_table(studies: Mapping[str, AxisStudy]) -> Table | None:
-    """The pair before and after, for every axis that has it; None if no axis has it."""
-    rows: list[tuple[str, ...]] = []
-    heads = ("", "before", "after", "shift")
-    for axis, one in studies.items():
-        change = one.change
-        if change is None or change.before is None or change.after is None:
-            continue
-        heads = ("", change.before_name, change.after_name, "shift")
-        for shift in change.shifts:
-            was, now = getattr(change.before, shift.name), getattr(change.after, shift.name)
-            moved = interval_text(shift.value, shift.low, shift.high, "Hz")
-            rows.append((f"{shift.name}, axis {axis}", _together(estimate_text(was)), _together(estimate_text(now)), _together(moved)))
-    return Table("Antiresonance and resonance: value [95 % interval]", heads, tuple(rows)) if rows else None
-
-
 def roots_text(roots: FloatArray | object) -> str:
     """Roots as text; a conjugate pair is written once."""
     values = np.asarray(roots, dtype=np.complex128)
-    return "; ".join(_together(root(complex(value))) for value in values if value.imag >= 0) or "none"
+    return "; ".join(together(root(complex(value))) for value in values if value.imag >= 0) or "none"
 
 
 def _with_interval(item: Interval, factor: float) -> list[str]:
@@ -126,10 +110,10 @@ def _slowest(fit: Fit) -> Interval | None:
 
 
 def _interval(item: Interval | None, without: str = "none found") -> str:
-    return _together(estimate_text(item)) if item is not None else without
+    return together(estimate_text(item)) if item is not None else without
 
 
-def _together(text: str) -> str:
+def together(text: str) -> str:
     """The text with non-breaking spaces."""
     return text.replace(" ", "\u00a0")
 

@@ -17,9 +17,9 @@ from xy_sysid.fitting import identify, nllsfdi
 from xy_sysid.fitting.of_recording import estimate, part
 from xy_sysid.fitting.structure import structure_from
 from xy_sysid.imports import save
+from xy_sysid.paper.study import AxisStudy, study_axis
+from xy_sysid.paper.study_page import study_page
 from xy_sysid.report import parts
-from xy_sysid.report.study import AxisStudy, study_axis
-from xy_sysid.report.study_page import study_page
 from xy_sysid.report.tables import coefficient_table, result_table
 from xy_sysid.report.words import estimate_text, number
 from xy_sysid.samples.recording import Recording

@@ -6,12 +6,24 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
+from xy_sysid.paper.pair import change_table, figure_caption, pair_caption, pair_figure, pair_title, study_remarks
+from xy_sysid.paper.study import AxisStudy
 from xy_sysid.report import captions, figures
 from xy_sysid.report.cover import Cover
-from xy_sysid.report.remarks import NOT_A_CONFIDENCE, PAPER_VALUES, PRINTED, axis_remarks
+from xy_sysid.report.remarks import NOT_A_CONFIDENCE
 from xy_sysid.report.sheet import Drawing, block, listing, paragraph, provenance_html, section, table_html, whole
-from xy_sysid.report.study import AxisStudy
-from xy_sysid.report.tables import change_table, coefficient_table, result_table
+from xy_sysid.report.tables import coefficient_table, result_table
+
+INTRODUCTION = (
+    "Figures 2 to 7 and tables 1 and 2 of the frequency-domain study of a ball-screw XY table, for this recording: excitation, "
+    "motion, frequency response, and transfer functions with their uncertainty."
+)
+PRINTED = (
+    "The NLLS denominators printed in the paper have negative coefficients. Taken literally they are unstable, with a pole far "
+    "above the measured band. They describe the response in the band, not the machine."
+)
+PAPER_VALUES = "For comparison, the paper reports errors of 39 % (LLS) and 11 % (NLLS), and delays of 1.29 ms (x) and 1.38 ms (y)."
+PAPER_VALUES = "For comparison, the paper reports errors of 39 % (LLS) and 11 % (NLLS), and delays of 1.29 ms (x) and 1.38 ms (y)."
 
 
 def study_page(
@@ -56,15 +68,15 @@ def study_page(
     made = []
     for axis, one in fitted.items():
         if one.change is not None and (one.change.before or one.change.after):
-            made.append(Drawing(f"plot-7-{len(made)}", figures.pair_figure(one.change), captions.change(axis, one.change), f"Axis {axis}"))
+            made.append(Drawing(f"plot-7-{len(made)}", pair_figure(one.change), pair_caption(axis, one.change), f"Axis {axis}"))
     changed = change_table(studies)
-    figure(7, captions.pair_title(studies), made, captions.pair(studies), table_html(changed) if changed else "")
+    figure(7, pair_title(studies), made, figure_caption(studies), table_html(changed) if changed else "")
     coefficients = "".join(table_html(coefficient_table(axis, one.fits)) for axis, one in fitted.items())
     results = "".join(table_html(result_table(one)) for one in fitted.values())
     parts.append(block("table-1", "Table 1: coefficients of the transfer functions", captions.COEFFICIENTS, coefficients))
     parts.append(block("table-2", "Table 2: error, “confidence” and physical values", f"{NOT_A_CONFIDENCE} {PAPER_VALUES}", results))
-    remarks = [PRINTED, *notes, *(text for one in studies.values() for text in axis_remarks(one))]
+    remarks = [PRINTED, *notes, *(text for one in studies.values() for text in study_remarks(one))]
     parts.append(f'<section id="remarks"><h2>Remarks</h2>{listing(remarks)}</section>')
     parts.append(provenance_html(origins))
-    head = f"<h1>Study of {escape(title)}</h1>{listing(captions.summary(one) for one in studies.values())}{paragraph(captions.INTRODUCTION)}"
+    head = f"<h1>Study of {escape(title)}</h1>{listing(captions.summary(one) for one in studies.values())}{paragraph(INTRODUCTION)}"
     return whole(Cover(f"Study of {title}"), head, parts, drawings)
