@@ -17,10 +17,10 @@ import numpy as np
 from campaigns.bench.tables import Check, Table
 from xy_sysid.excitation import signal
 from xy_sysid.fitting import Fit, Structure, identify
-from xy_sysid.fitting.result import Interval
 from xy_sysid.linear.simulate import simulate
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.batch_spectra import batch_spectra
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import Z95, FrequencyResponse
 from xy_sysid.response.h1 import H1Options, frequency_response
 from xy_sysid.response.windows import WindowShape
@@ -75,10 +75,10 @@ def truths(tf: TransferFunction, fit: Fit) -> dict[str, float]:
     return exact
 
 
-def trials(runs: int, seconds: float, noise: float, report: Callable[[str], None] = lambda _: None) -> tuple[dict[str, list[Interval]], list[Fit]]:
+def trials(runs: int, seconds: float, noise: float, report: Callable[[str], None] = lambda _: None) -> tuple[dict[str, list[Estimate]], list[Fit]]:
     """Estimates by name over ``runs`` recordings, and the fits."""
     tf = machine()
-    found: dict[str, list[Interval]] = {}
+    found: dict[str, list[Estimate]] = {}
     fits: list[Fit] = []
     for seed in range(1, runs + 1):
         fit = identify(response(*recorded(tf, seconds, noise, seed)), Structure())

@@ -26,7 +26,7 @@ from xy_sysid.control_design.tables import friction_table, position_tables
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.control_design.use import use
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.samples.block import FloatArray
 
 RATE = 2000.0

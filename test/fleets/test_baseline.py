@@ -23,9 +23,9 @@ from xy_sysid.fleets.causes import causes
 from xy_sysid.fleets.commissioned import of_axis_models, of_transfer_functions
 from xy_sysid.fleets.history import MONTH
 from xy_sysid.fleets.wander import Series
-from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.live.plain_messages import OK, WARN, StatusMessage
 from xy_sysid.nodes.since_commissioning import SinceCommissioning
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import DiagnoserSettings, IdentifierSettings
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.units import USUAL, Units
 
 RATE = 2000.0  # Hz, of their assumed recording

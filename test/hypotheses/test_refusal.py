@@ -13,8 +13,8 @@ from xy_sysid.axis.model import STANDARD, AxisModel, Library
 from xy_sysid.effects._contract import law
 from xy_sysid.greybox.axis_data import AxisData, prepare
 from xy_sysid.greybox.free_run import GreyboxFit, fit_base, fit_with
-from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.hypotheses.refusal import at_bound, refusal
+from xy_sysid.response.estimate import Estimate
 
 SPLIT = Estimate(name="screw_compliance.split", value=1.0, unit="", low=0.9, high=1.1)
 

@@ -16,8 +16,8 @@ from xy_sysid.diagnosis.rungs import rungs_of
 from xy_sysid.greybox.axis_data import prepare
 from xy_sysid.greybox.free_run import fit_with, fitted_score
 from xy_sysid.greybox.open_loop import open_loop, settled
-from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.imports import load
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.units import Units
 
 EMPS = "emps/emps_train.npz"

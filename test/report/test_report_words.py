@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from xy_sysid.fitting import Interval
 from xy_sysid.report.words import estimate_text, number, quantity, root
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.units import readable
 
 
@@ -20,9 +20,9 @@ def test_a_number_has_a_true_minus_and_powers_of_ten_only_where_needed(value: fl
 
 def test_an_interval_keeps_its_zeros_and_shows_two_digits_of_its_half_width() -> None:
     """46.4070, not 46.407, next to 46.3928; milliseconds for seconds."""
-    assert estimate_text(Interval("r", 46.3999, 0.0036, 46.3928, 46.4070, "Hz")) == "46.3999 [46.3928, 46.4070] Hz"
-    assert estimate_text(Interval("delay", 1.29e-3, 1e-6, 1.28e-3, 1.30e-3, "s")) == "1.290 [1.280, 1.300] ms"
-    assert estimate_text(Interval("a", 2.5e7, 1e4, 2.498e7, 2.502e7, "")) == "2.5000 [2.4980, 2.5020]·10⁷"
+    assert estimate_text(Estimate(name="r", value=46.3999, unit="Hz", low=46.3928, high=46.4070)) == "46.3999 [46.3928, 46.4070] Hz"
+    assert estimate_text(Estimate(name="delay", value=1.29e-3, unit="s", low=1.28e-3, high=1.30e-3)) == "1.290 [1.280, 1.300] ms"
+    assert estimate_text(Estimate(name="a", value=2.5e7, unit="", low=2.498e7, high=2.502e7)) == "2.5000 [2.4980, 2.5020]·10⁷"
 
 
 def test_lengths_are_read_in_mm_and_other_units_stay() -> None:

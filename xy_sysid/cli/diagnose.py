@@ -18,8 +18,8 @@ from xy_sysid.units import motion
 if TYPE_CHECKING:
     from xy_sysid.axis.mechanics import Transmission
     from xy_sysid.diagnosis.answer import Answer, Rung
-    from xy_sysid.greybox.parameters import Estimate
     from xy_sysid.imports.reading import Reading
+    from xy_sysid.response.estimate import Estimate
 
 Own = Annotated[list[Path] | None, typer.Option("--effect-file", metavar="FILE", help="a Python file with an effect of your own (may be repeated)")]
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from xy_sysid.axis.linear_part import linear_part
 from xy_sysid.axis.model import AxisModel, simulate
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.greybox.parameters import Estimate, parameter_table
+from xy_sysid.greybox.parameters import parameter_table
 from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.tables import Table
 from xy_sysid.units import USUAL, Units, moved

@@ -16,7 +16,7 @@ import scipy
 from xy_sysid.axis.model import AxisModel
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.errors import BadInput
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 

@@ -15,8 +15,9 @@ from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.comparison.where_it_fails import Comparison
 from xy_sysid.diagnosis.unmodelled import UnmodelledForce
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.greybox.parameters import Estimate, parameter_table
+from xy_sysid.greybox.parameters import parameter_table
 from xy_sysid.hypotheses.criteria import AT_FLOOR
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.samples.recording import Run
 from xy_sysid.tables import Table
 from xy_sysid.units import USUAL, Units, bare, motion, moved

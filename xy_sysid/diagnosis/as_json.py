@@ -9,7 +9,7 @@ from typing import Any
 from xy_sysid.comparison.where_it_fails import Place
 from xy_sysid.diagnosis import words
 from xy_sysid.diagnosis.answer import Answer, Rung, Tried
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.estimate import Estimate
 
 
 def answer_document(found: Answer) -> dict[str, Any]:

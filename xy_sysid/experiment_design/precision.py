@@ -25,7 +25,7 @@ from xy_sysid.experiment_design.proposals import neighbours, proposals
 from xy_sysid.greybox.axis_data import AxisData, prepare_all
 from xy_sysid.greybox.free_run import GreyboxFit, finish
 from xy_sysid.greybox.least_squares import model_error_covariance
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 

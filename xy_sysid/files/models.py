@@ -21,7 +21,7 @@ from xy_sysid.files.seal import sealed
 from xy_sysid.files.unasked import free
 from xy_sysid.fitting.of_run import LinearModel
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.units import OF, USUAL, Units
 
 AXIS_FORMAT = "xy_sysid axis model 1"

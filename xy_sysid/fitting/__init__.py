@@ -21,7 +21,7 @@ from collections.abc import Callable
 
 from xy_sysid.fitting import iwls, lls, ml, nlls, nllsfdi
 from xy_sysid.fitting.identify import identify
-from xy_sysid.fitting.result import Fit, Interval
+from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import FitOptions, Structure
 
 ESTIMATORS: dict[str, Callable[..., Fit]] = {
@@ -32,4 +32,4 @@ ESTIMATORS: dict[str, Callable[..., Fit]] = {
     "nllsfdi": nllsfdi.fit,
 }
 
-__all__ = ["ESTIMATORS", "Fit", "FitOptions", "Interval", "Structure", "identify"]
+__all__ = ["ESTIMATORS", "Fit", "FitOptions", "Structure", "identify"]

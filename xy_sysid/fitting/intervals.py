@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from xy_sysid.fitting.problem import Point, Problem
-from xy_sysid.fitting.result import Interval
 from xy_sysid.fitting.structure import Structure
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import Z95, ComplexArray
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import over, position_of
@@ -20,22 +20,22 @@ BEYOND = 1e3  # standard error relative to the value above which an interval is 
 PAIRS = {"pole": "resonance", "zero": "antiresonance"}
 
 
-def _estimate(name: str, value: float, variance: float, unit: str) -> Interval:
+def _estimate(name: str, value: float, variance: float, unit: str) -> Estimate:
     sigma = float(np.sqrt(variance)) if variance >= 0 else float("nan")
     if not sigma <= BEYOND * abs(value) and value != 0.0:
         sigma = float("inf")
-    return Interval(name=name, value=float(value), sigma=sigma, low=float(value) - Z95 * sigma, high=float(value) + Z95 * sigma, unit=unit)
+    return Estimate(name=name, value=float(value), unit=unit, low=float(value) - Z95 * sigma, high=float(value) + Z95 * sigma)
 
 
-def with_rate(items: Iterable[Interval], error: float, structure: Structure) -> tuple[Interval, ...]:
+def with_rate(items: Iterable[Estimate], error: float, structure: Structure) -> tuple[Estimate, ...]:
     """The intervals including the relative ``error`` of the sampling rate, with which every time and frequency scales.
 
     A model of s that is fitted to lines of a rate c times too high has b_k and a_k c^(n - k) times too large, n the order.
     """
 
-    def widened(item: Interval) -> Interval:
+    def widened(item: Estimate) -> Estimate:
         sigma = math.hypot(item.sigma, _power(item.name, structure) * error * item.value)
-        return replace(item, sigma=sigma, low=item.value - Z95 * sigma, high=item.value + Z95 * sigma)
+        return replace(item, low=item.value - Z95 * sigma, high=item.value + Z95 * sigma)
 
     return tuple(widened(item) for item in items) if error > 0.0 else tuple(items)
 
@@ -52,7 +52,7 @@ def _power(name: str, structure: Structure) -> int:
     return 1 if kind in PAIRS else structure.free_order + max(structure.power, 0) - int(rest)
 
 
-def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance: FloatArray) -> tuple[Interval, ...]:
+def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance: FloatArray) -> tuple[Estimate, ...]:
     """The reported parameters, in order."""
     return tuple(
         _estimate(name, float(value), float(variance), "s" if name == "delay" else "")
@@ -60,7 +60,7 @@ def coefficient_estimates(names: tuple[str, ...], values: FloatArray, covariance
     )
 
 
-def gain_estimate(task: Problem, at: Point, inner: FloatArray) -> Interval:
+def gain_estimate(task: Problem, at: Point, inner: FloatArray) -> Estimate:
     """Gain of s^integrators times the position's response at s = 0: the static gain, or the velocity gain with one integrator."""
     structure, frf = task.structure, task.frf
     where = np.array([0.0 + 0.0j if structure.domain == "s" else 1.0 + 0.0j])
@@ -76,7 +76,7 @@ def gain_estimate(task: Problem, at: Point, inner: FloatArray) -> Interval:
     return _estimate("gain", value * scale, float(slope @ inner @ slope) * scale**2, unit)
 
 
-def root_estimates(task: Problem, at: Point, roots: ComplexArray, inner: FloatArray, name: Literal["pole", "zero"]) -> list[Interval]:
+def root_estimates(task: Problem, at: Point, roots: ComplexArray, inner: FloatArray, name: Literal["pole", "zero"]) -> list[Estimate]:
     """Roots of sum_k c_k p_k, conjugates once: d root / d c_k = -p_k(root) / derivative(root).
 
     roots: of the denominator ("pole") or the numerator ("zero") at the point; inner: covariance of its parameters
@@ -88,7 +88,7 @@ def root_estimates(task: Problem, at: Point, roots: ComplexArray, inner: FloatAr
     size = coefficients.size - int(name == "pole")
     lead = coefficients[-1] * part.powers()[-1, -1]
     values = part.values(roots)
-    out: list[Interval] = []
+    out: list[Estimate] = []
     chosen = [i for i in np.argsort(np.abs(roots)) if roots[i].imag >= 0]
     pairs = 0
     for number, i in enumerate(chosen, start=1):

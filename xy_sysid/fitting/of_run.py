@@ -11,11 +11,11 @@ from xy_sysid.errors import BadInput
 from xy_sysid.fitting import ESTIMATORS, Fit, identify
 from xy_sysid.fitting.of_given_response import settings_for
 from xy_sysid.fitting.of_recording import FIXED, estimate, judged, with_orders
-from xy_sysid.fitting.result import Interval
 from xy_sysid.fitting.structure import Structure, Weighting, structure_from
 from xy_sysid.fitting.verdicts import HeldOut, Validation, Verdict, validate
 from xy_sysid.linear.simulate import simulate_sampled
 from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.integral import detrended
@@ -53,12 +53,12 @@ class LinearModel:
         return f"transfer function {self.tf.numerator.size - 1}/{self.tf.denominator.size - 1}"
 
     @property
-    def intervals(self) -> tuple[Interval, ...]:
+    def intervals(self) -> tuple[Estimate, ...]:
         """95 % intervals of coefficients, delay, gain, poles, zeros and resonances, for noise alone; empty for a model from a file."""
         return self.fit.intervals if self.fit is not None else ()
 
     @property
-    def intervals_with_misfit(self) -> tuple[Interval, ...]:
+    def intervals_with_misfit(self) -> tuple[Estimate, ...]:
         """The intervals, widened for the residual error above the noise."""
         return self.fit.intervals_with_misfit if self.fit is not None else ()
 

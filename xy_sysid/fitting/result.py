@@ -8,21 +8,10 @@ from dataclasses import dataclass, replace
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.structure import Structure
 from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import Units, units_of
-
-
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """One number with its 95 % interval [low, high] and standard error, all in ``unit``."""
-
-    name: str
-    value: float
-    sigma: float
-    low: float
-    high: float
-    unit: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +62,7 @@ class Fit:
     jacobian: FloatArray
     poles: ComplexArray
     zeros: ComplexArray
-    intervals: tuple[Interval, ...]
+    intervals: tuple[Estimate, ...]
     iterations: int
     converged: bool
     reason: str
@@ -102,13 +91,12 @@ class Fit:
         return 1.0 if self.consistent else math.sqrt(max(self.cost / self.expected_cost, 1.0))
 
     @property
-    def intervals_with_misfit(self) -> tuple[Interval, ...]:
+    def intervals_with_misfit(self) -> tuple[Estimate, ...]:
         """The intervals, widened by ``misfit``; NaN bounds if it is unknown."""
         factor = self.misfit
         return tuple(
             replace(
                 item,
-                sigma=factor * item.sigma,
                 low=item.value - factor * (item.value - item.low),
                 high=item.value + factor * (item.high - item.value),
             )
@@ -121,12 +109,12 @@ class Fit:
         return units_of(self.tf.input_unit, self.tf.output_unit)
 
     @property
-    def rigid(self) -> tuple[Interval, ...]:
+    def rigid(self) -> tuple[Estimate, ...]:
         """Gain and pole of the rigid body, from which inertia and damping follow; none if the gain is not that of a velocity."""
         ours = tuple(item for item in self.intervals_with_misfit if item.name in ("gain", "pole_1"))
         return ours if any(item.name == "gain" and item.unit == self.units.of("m/s/V") for item in ours) else ()
 
-    def interval(self, name: str) -> Interval:
+    def interval(self, name: str) -> Estimate:
         """The estimate of that name; raises BadInput if there is none."""
         for item in self.intervals:
             if item.name == name:

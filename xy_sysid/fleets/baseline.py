@@ -25,7 +25,7 @@ from xy_sysid.fleets.change import evidence
 from xy_sysid.fleets.columns import column_of
 from xy_sysid.fleets.history import BEGIN, MONTH, History
 from xy_sysid.fleets.wander import SPREADS, USUAL, Series, grid
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 

@@ -14,8 +14,8 @@ from xy_sysid.files.models import read_models
 from xy_sysid.fleets.columns import column_of, columns
 from xy_sysid.fleets.trends import trend
 from xy_sysid.fleets.words import widest
-from xy_sysid.greybox.parameters import Estimate
 from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.response.estimate import Estimate
 
 Known = tuple[Estimate, ...]
 

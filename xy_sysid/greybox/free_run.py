@@ -21,11 +21,12 @@ from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare, prepare_all
 from xy_sysid.greybox.forces import dry_frictions, force_of, friction_of, position_forces
 from xy_sysid.greybox.least_squares import Scale, Schedule, Solution, Target, solve
 from xy_sysid.greybox.objective import Objective
-from xy_sysid.greybox.parameters import Estimate, FitProblem, estimates, model_of, problem
+from xy_sysid.greybox.parameters import FitProblem, estimates, model_of, problem
 from xy_sysid.greybox.score_test import Screen, Trace, bounded, screen
 from xy_sysid.greybox.start_inverse import CUTOFFS, inverse_starts, rigid_starts
 from xy_sysid.greybox.start_rigid import base_start
 from xy_sysid.jit import on_all_cores
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 

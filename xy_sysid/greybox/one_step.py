@@ -19,8 +19,9 @@ from xy_sysid.effects._contract import PATIENT, Companions, DryFriction, FilterF
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.floor import count_size
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
-from xy_sysid.greybox.parameters import Estimate, unit_of
+from xy_sysid.greybox.parameters import unit_of
 from xy_sysid.greybox.score_test import bounded
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import Z95
 
 AT_NOISE = 3.5  # held-out innovation over encoder noise up to which an effect explains the axis

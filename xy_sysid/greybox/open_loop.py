@@ -15,7 +15,7 @@ from xy_sysid.axis.model import AxisModel, simulator, start_of
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
 from xy_sysid.greybox.free_run import AxisData, GreyboxFit
-from xy_sysid.greybox.parameters import Estimate
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.samples.block import FloatArray
 
 ROUNDS = 40  # most rounds of least squares

@@ -16,23 +16,12 @@ from xy_sysid.axis.model import AxisModel, simulator, start_of
 from xy_sysid.effects import Parameter
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.least_squares import Predictor, Scale, Solution
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.tables import Table
 
 BEGINS = 2000.0  # Hz: sub-steps for the estimation of start speeds
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """One parameter with its 95 % interval; if it differs between recordings, their mean, and ``recordings`` holds each value."""
-
-    name: str
-    value: float
-    unit: str
-    low: float
-    high: float
-    recordings: tuple[Estimate, ...] = ()
 
 
 def parameter_table(parameters: tuple[Estimate, ...]) -> Table:

@@ -16,7 +16,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.fitting import identify
 from xy_sysid.fitting.choose_orders import Choice, choose, stands
 from xy_sysid.fitting.modes import pole_estimates
-from xy_sysid.fitting.result import Fit, Interval
+from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import FitOptions, structure_from
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.coupling_messages import coupling_messages, coupling_status
@@ -25,6 +25,7 @@ from xy_sysid.live.messages import comparison_message, frf_message, transfer_fun
 from xy_sysid.live.plain_messages import ERROR, OK, WARN, ArrayMessage, StatusMessage
 from xy_sysid.live.resonance_watch import Resonance, Track, alarm_sentence, follow
 from xy_sysid.live.stretch_fits import FittedStretch, StretchFits
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.h1 import H1Options, frequency_response
 from xy_sysid.response.spectra import RunningSpectra, State, Transformer
@@ -164,7 +165,7 @@ def watched(fit: Fit, near: float | None = None) -> Resonance | None:
     return _light(fit.intervals, fit.frequency, near)
 
 
-def _light(intervals: tuple[Interval, ...], band: FloatArray, near: float | None) -> Resonance | None:
+def _light(intervals: tuple[Estimate, ...], band: FloatArray, near: float | None) -> Resonance | None:
     found: list[tuple[float, Resonance]] = []
     low, high = float(band[0]), float(band[-1])
     values = {item.name: item.value for item in intervals}

@@ -13,11 +13,10 @@ from xy_sysid.settings import DiagnoserSettings, IdentifierSettings
 
 if TYPE_CHECKING:
     from xy_sysid.axis.model import Library
-    from xy_sysid.fitting.result import Interval
     from xy_sysid.fleets.baseline import Baseline
     from xy_sysid.fleets.causes import Causes
-    from xy_sysid.greybox.parameters import Estimate
     from xy_sysid.linear.transfer_function import TransferFunction
+    from xy_sysid.response.estimate import Estimate
 
 Column = Callable[[str], str]
 
@@ -72,13 +71,10 @@ class SinceCommissioning:
 
             self._baselines = {axis: Baseline(known, self._spreads, self._column, self._effects) for axis, known in self._known.items()}
 
-    def hear(self, axis: str, estimates: Iterable[Estimate | Interval], begin: float, end: float) -> None:
+    def hear(self, axis: str, estimates: Iterable[Estimate], begin: float, end: float) -> None:
         """Add the estimates from a stretch of data of an axis; begin, end: s; see ``Baseline.hear``."""
         if axis in self._baselines:
-            from xy_sysid.greybox.parameters import Estimate
-
-            found = [Estimate(name=one.name, value=one.value, unit=one.unit, low=one.low, high=one.high) for one in estimates]
-            self._baselines[axis].hear(found, begin, end)
+            self._baselines[axis].hear(estimates, begin, end)
 
     def statuses(self) -> list[StatusMessage]:
         """A status for each axis that has a baseline."""

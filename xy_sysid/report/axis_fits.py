@@ -10,12 +10,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from xy_sysid.errors import BadInput
-from xy_sysid.fitting import Fit, Interval, Structure, identify, lls, nllsfdi
+from xy_sysid.fitting import Fit, Structure, identify, lls, nllsfdi
 from xy_sysid.fitting.choose_orders import Choice
 from xy_sysid.fitting.of_recording import AxisEstimate, estimate, with_orders
 from xy_sysid.fitting.structure import structure_from
 from xy_sysid.live.fitter import LIGHT_DAMPING, watched
 from xy_sysid.report.signals import Excitation, Motion, excitation, motion
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.recording import Recording
 from xy_sysid.settings import IdentifierSettings
@@ -27,8 +28,8 @@ NEAR = 2.0  # an antiresonance belongs to a resonance when their frequencies dif
 class Pair:
     """A resonance and its antiresonance (None without one), with intervals, in the fit that is named."""
 
-    resonance: Interval
-    antiresonance: Interval | None
+    resonance: Estimate
+    antiresonance: Estimate | None
     fit: Fit
 
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xy_sysid.fitting import Fit, Interval
+from xy_sysid.fitting import Fit
 from xy_sysid.fitting.model_orders import OrderTrial
 from xy_sysid.report.axis_fits import AxisFits
 from xy_sysid.report.words import estimate_text, interval_parts, number, root, superscript
+from xy_sysid.response.estimate import Estimate
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import over, readable
 
@@ -93,23 +94,23 @@ def roots_text(roots: FloatArray | object) -> str:
     return "; ".join(together(root(complex(value))) for value in values if value.imag >= 0) or "none"
 
 
-def _with_interval(item: Interval, factor: float) -> list[str]:
+def _with_interval(item: Estimate, factor: float) -> list[str]:
     """[value, interval], both with the same decimals."""
     value, low, high, power = interval_parts(item.value * factor, item.low * factor, item.high * factor)
     return [f"{value}{power}", f"[{low}, {high}]{power}"]
 
 
-def _named(fit: Fit, name: str) -> Interval | None:
+def _named(fit: Fit, name: str) -> Estimate | None:
     return next((item for item in fit.intervals_with_misfit if item.name == name), None)
 
 
-def _slowest(fit: Fit) -> Interval | None:
+def _slowest(fit: Fit) -> Estimate | None:
     """The slowest real pole, except integrators."""
     real = [item for item in fit.intervals_with_misfit if item.name.startswith("pole_") and "." not in item.name]
     return min(real, key=lambda item: abs(item.value)) if real else None
 
 
-def _interval(item: Interval | None, without: str = "none found") -> str:
+def _interval(item: Estimate | None, without: str = "none found") -> str:
     return together(estimate_text(item)) if item is not None else without
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from xy_sysid.units import motion, readable
 
 if TYPE_CHECKING:
-    from xy_sysid.fitting import Interval
+    from xy_sysid.response.estimate import Estimate
 
 LARGE, TINY = 1e6, 1e-4  # numbers are written with a power of ten from LARGE on and below TINY
 
@@ -84,7 +84,7 @@ def interval_text(value: float, low: float, high: float, unit: str, name: str = 
     return f"{middle} [{first}, {last}]{power} {shown}".rstrip()
 
 
-def estimate_text(item: Interval) -> str:
+def estimate_text(item: Estimate) -> str:
     """value [low, high] unit."""
     return interval_text(item.value, item.low, item.high, item.unit, item.name)
 
