@@ -27,6 +27,7 @@ Packages in the order of the data; each imports only from those before it.
     bags, imports, files, processes: reading, writing, other processes
     fleets:                     many recordings of many machines, and what changes over time
     nodes, report, page, cli:  user interfaces
+    paper:                      the paper's study
     front_door:                wrappers of the public functions
 
 All packages may import ``errors``, ``settings``, ``units`` and ``jit``. The names of ``__all__`` are public, and each is loaded
@@ -40,7 +41,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from xy_sysid.axis.model import AxisModel
-    from xy_sysid.cli.simulated_recording import simulate
     from xy_sysid.comparison.of_run import better, compare, validate
     from xy_sysid.comparison.physical_model import PhysicalModel
     from xy_sysid.control_design.use import use
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from xy_sysid.fitting.of_run import LinearModel, fit, frf
     from xy_sysid.fleets.of_paths import fleet
     from xy_sysid.fleets.trends import trend
+    from xy_sysid.front_door.simulated_recording import simulate
     from xy_sysid.front_door.small_models import coupling, mechanics, servo, steps
     from xy_sysid.imports import load
     from xy_sysid.imports.response_file import frf_from
@@ -130,7 +131,7 @@ _HOMES = {
     "fleets.of_paths": ("fleet",),
     "fleets.trends": ("trend",),
     "front_door.small_models": ("coupling", "mechanics", "servo", "steps"),
-    "cli.simulated_recording": ("simulate",),
+    "front_door.simulated_recording": ("simulate",),
     "report.written": ("write_report",),
     "errors": ("BadInput", "BadRecording", "MissingExtra", "XySysidError"),
 }

@@ -23,7 +23,7 @@ FLOORS = {
     "in time": ("time_models", "effects", "axis", "greybox", "comparison", "hypotheses", "diagnosis", "experiment_design"),
     "told": ("story", "live", "control_design"),
     "the edge": ("bags", "imports", "files", "processes", "fleets"),
-    "surfaces": ("nodes", "report", "paper", "page", "cli", "front_door"),
+    "surfaces": ("nodes", "report", "paper", "page", "front_door", "cli"),
 }
 
 

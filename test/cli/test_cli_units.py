@@ -11,7 +11,7 @@ import pytest
 from helpers.cli_tools import cli
 from helpers.html_pages import parsed
 
-from xy_sysid.cli.simulated_recording import simulate
+from xy_sysid.front_door.simulated_recording import simulate
 from xy_sysid.imports import save
 
 LENGTHS = re.compile(r"(?<![A-Za-z])(?:[munµ]?m|[mk]?V|N|volts?|(?:milli|micro)?met(?:re|er)s?)(?![A-Za-z])")

@@ -11,12 +11,12 @@ import xy_sysid as xy
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
-from xy_sysid.cli.simulated_recording import simulate
 from xy_sysid.comparison.where_it_fails import Comparison, Unseen, by_chance, compare, compare_motion
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.fitting import Structure, identify
 from xy_sysid.fitting.of_recording import estimate, split
+from xy_sysid.front_door.simulated_recording import simulate
 from xy_sysid.greybox.axis_data import prepare
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, IdentifierSettings

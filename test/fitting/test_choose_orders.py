@@ -8,11 +8,11 @@ from helpers.fitting_cases import LINES, function, held, paper_machine, response
 from helpers.real_data import data
 
 import xy_sysid as xy
-from xy_sysid.cli.simulated_recording import simulate
 from xy_sysid.fitting import Structure, choose_orders, identify
 from xy_sysid.fitting.choose_orders import MOST_POLES, Choice, choose, stands
 from xy_sysid.fitting.structure import FitOptions
 from xy_sysid.fitting.verdicts import validate
+from xy_sysid.front_door.simulated_recording import simulate
 from xy_sysid.linear.simulate import held_response
 from xy_sysid.linear.transfer_function import TransferFunction
 

@@ -11,12 +11,12 @@ import pytest
 from helpers.live_streams import AXES, blocks, last, recorded
 
 from xy_sim.machine import Machine
-from xy_sysid.cli.simulated_recording import simulate
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting import identify
 from xy_sysid.fitting.choose_orders import Choice, choose
 from xy_sysid.fitting.result import Fit
 from xy_sysid.fitting.structure import Structure
+from xy_sysid.front_door.simulated_recording import simulate
 from xy_sysid.live import fitter
 from xy_sysid.live.fitter import LiveFitter, Update
 from xy_sysid.live.identifier import FitRequest, Identifier

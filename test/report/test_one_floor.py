@@ -10,7 +10,7 @@ import pytest
 from helpers.cli_tools import cli
 
 import xy_sysid as xy
-from xy_sysid.cli.simulated_recording import simulate
+from xy_sysid.front_door.simulated_recording import simulate
 from xy_sysid.imports import save
 from xy_sysid.page.facts import story_facts
 from xy_sysid.report import story_figures as draw

@@ -35,8 +35,8 @@ def simulate(
 ) -> None:
     """Simulate the XY table and write a recording."""
     from xy_sysid.bags.atomic import write_text
-    from xy_sysid.cli.simulated_recording import excitation, table_of
     from xy_sysid.excitation.lockstep import drive
+    from xy_sysid.front_door.simulated_recording import excitation, table_of
     from xy_sysid.imports import save
     from xy_sysid.settings import AxisExcitation
 
