@@ -25,6 +25,11 @@ WINDOW = 2.0  # s, approximately: the lowest band is 1/2 Hz wide
 NOISE_BAND = (0.6, 0.94)  # relative to Nyquist; its quietest twentieth counts as encoder noise, as harmonics of friction may reach into it
 BINS, HARMONICS, SPARSE = 128, 16, 4  # of the spectrum of quantisation noise, from every fourth sample
 POLES = 60  # number of tested rigid axes
+SHORTEST, LONGEST = 16, 4096  # samples of a window for spectra, of short data and of the encoder noise
+PARTS, SHORT = 8, 32  # windows for the noise of a sensor that is driven, and the least samples of one
+TWENTIETH = 0.05  # relative to Nyquist: width of the parts of ``NOISE_BAND``
+ROUNDING = 16.0  # times the rounding error of a position: smaller steps are none
+MULTIPLES, OFF, NEARLY = 200.0, 1e-3, 0.9  # steps are multiples of a count up to this one, to this part, in this share of all
 SEEN = 3.0  # a band is excited if the power of the measured velocity is this many times that of the encoder noise
 
 
@@ -121,7 +126,7 @@ def _taper(length: int) -> FloatArray:
 def bands(sampling_rate: float, samples: int, count: int = 36, sensed: Sensed = "position") -> Bands:
     """Windows of about 2 s (less for short data) and at most ``count`` bands, logarithmically spaced."""
     wanted = min(WINDOW * sampling_rate, samples)
-    length = 2 ** max(int(np.round(np.log2(max(wanted, 16.0)))), 4)
+    length = 2 ** int(np.round(np.log2(max(wanted, SHORTEST))))
     top = min(TOP, TOP_SHARE * sampling_rate)
     last = max(int(top * length / sampling_rate), 2)
     edges = np.unique(np.round(np.geomspace(2.0, last + 1, count + 1)).astype(np.int64))
@@ -158,9 +163,9 @@ def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "
     """
     measured = as_sensed(position, sampling_rate, sensed)
     stationary = np.diff(position) * sampling_rate if sensed == "position" else measured
-    length = min(4096, stationary.size // 2 * 2)
+    length = min(LONGEST, stationary.size // 2 * 2)
     if sensed != "position" and driven_by is not None:
-        length = min(length, max(2 ** int(np.log2(max(stationary.size / 8.0, 32.0))), 32), stationary.size // 2 * 2)
+        length = min(length, 2 ** int(np.log2(max(stationary.size / PARTS, SHORT))), stationary.size // 2 * 2)
     windows = np.lib.stride_tricks.sliding_window_view(stationary, length)[:: length // 2] * np.hanning(length)
     spectrum = scipy.fft.rfft(windows, axis=1)
     power = np.mean(np.abs(spectrum) ** 2, axis=0)
@@ -174,8 +179,13 @@ def encoder_noise(sampling_rate: float, position: FloatArray, sensed: Sensed = "
     white = power[1:]
     if sensed == "position":
         white = white / np.maximum((2.0 * np.sin(0.5 * np.pi * share) * sampling_rate) ** 2, 1e-300)
-    seen = [float(np.median(white[(share >= low) & (share < low + 0.05)])) for low in np.arange(*NOISE_BAND, 0.05)]
-    return float(np.sqrt(max(min(seen), count_size(measured) ** 2 / 12.0)))
+    seen = [float(np.median(white[(share >= low) & (share < low + TWENTIETH)])) for low in np.arange(*NOISE_BAND, TWENTIETH)]
+    return float(np.sqrt(max(min(seen), rounding_power(count_size(measured)))))
+
+
+def rounding_power(count: float) -> float:
+    """Power, m^2, of the error that rounding to whole counts makes (Widrow 1956); count: m."""
+    return count**2 / 12.0
 
 
 def count_size(position: FloatArray) -> float:
@@ -185,12 +195,12 @@ def count_size(position: FloatArray) -> float:
     if steps.size == 0:
         return 0.0
     scale = float(np.max(np.abs(position))) + 1e-300
-    least = float(steps[steps > 16.0 * np.finfo(np.float64).eps * scale].min(initial=np.inf))
+    least = float(steps[steps > ROUNDING * np.finfo(np.float64).eps * scale].min(initial=np.inf))
     if not np.isfinite(least):
         return 0.0
-    whole = steps[steps < 200.0 * least] / least
-    fits = np.abs(whole - np.round(whole)) < 1e-3 * np.maximum(whole, 1.0)
-    return least if whole.size >= 2 and float(np.mean(fits)) > 0.9 else 0.0
+    whole = steps[steps < MULTIPLES * least] / least
+    fits = np.abs(whole - np.round(whole)) < OFF * np.maximum(whole, 1.0)
+    return least if whole.size >= 2 and float(np.mean(fits)) > NEARLY else 0.0
 
 
 def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float, driven: FloatArray | None = None) -> Floor:
@@ -205,8 +215,8 @@ def floor(windows: Windows, velocity: FloatArray, encoder: float, epsilon: float
     if count > 0.0:
         seen = np.flatnonzero(signal > SEEN * noise)
         top = float(layout.edges()[(seen[-1] if seen.size else 0) + 1])
-        counts = count**2 / 12.0 * counted(layout, velocity, count, top)
-        noise = np.bincount(layout.band, unit * (max(encoder**2 - count**2 / 12.0, 0.0) + counts), layout.count) / layout.lines
+        counts = rounding_power(count) * counted(layout, velocity, count, top)
+        noise = np.bincount(layout.band, unit * (max(encoder**2 - rounding_power(count), 0.0) + counts), layout.count) / layout.lines
     own = np.maximum(signal - noise, 0.0)
     around = np.concatenate(([own[0]], own, [own[-1]]))
     envelope = np.maximum(np.maximum(around[:-2], around[2:]), own)

@@ -45,6 +45,9 @@ __all__ = [
     "screened",
 ]
 
+POLES = (1e-2, 1e5)  # rad/s: of a start
+LEAST_TIMES, MOST_TIMES = 0.3, 3.0  # between these a start multiplies a force that is known
+
 FIRST_LOOK = Schedule(1, 6, 1e-2, 1e-2)
 NEARER = Schedule(4, 6, 3e-3, 3e-3)
 FINER = Schedule(2, 8, 1e-4, 1e-3)
@@ -111,7 +114,7 @@ def fit_base(data: AxisData, library: Library = STANDARD) -> GreyboxFit:
     models = [AxisModel(gain, delay, pole, library=library)]
     for late in {delay, 0.0}:
         scene = _scene(data, AxisModel(gain, late, pole, library=library), data.first_stage(data.velocity), data.first_stage)
-        models += [AxisModel(own, late, min(max(its, 1e-2), 1e5), library=library) for own, its in rigid_starts(scene)]
+        models += [AxisModel(own, late, float(np.clip(its, *POLES)), library=library) for own, its in rigid_starts(scene)]
     return fit(data, best_start(data, models))
 
 
@@ -177,7 +180,7 @@ def inverse_start_models(
         candidates += _from_inverse_dynamics(data, replace(model, delay=0.0), effect, scene.prompt, least)
     if effect.joint is not None:
         for gain, later, pole, values in effect.joint(scene):
-            whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=min(max(pole, 1e-2), 1e5))
+            whole = replace(model, gain=gain, delay=max(base.model.delay + later, 0.0), pole=float(np.clip(pole, *POLES)))
             candidates.append(whole.with_effect(name, bounded(effect, values, data.similar)))
     return candidates
 
@@ -192,7 +195,7 @@ def _from_inverse_dynamics(data: AxisData, model: AxisModel, effect: Effect, sce
     forces = [force_of(data, known, own, data.counts(early=scene.velocity.size == data.first)) for own in by_position]
     forces += [friction_of(scene, known, own) for own in frictions]
     for start in inverse_starts(effect, scene, scene.velocity.size, forces, bool(frictions), least):
-        whole = replace(known, gain=start.gain, pole=min(max(start.pole, 1e-2), 1e5))
+        whole = replace(known, gain=start.gain, pole=float(np.clip(start.pole, *POLES)))
         for own, size in zip((*by_position, *frictions), start.sizes, strict=True):
             whole = whole.with_effect(own, bounded(known.library[own], _scaled(known, own, size), data.similar))
         whole = whole if known is model else whole.joined()
@@ -224,13 +227,13 @@ def _friction_split(model: AxisModel) -> AxisModel:
 
 
 def _scaled(model: AxisModel, name: str, times: float) -> tuple[float, ...]:
-    """The values of an effect whose force is multiplied by ``times``, at most by three: its size, and every other level of a friction.
+    """The values of an effect whose force is multiplied by ``times``, at most by ``MOST_TIMES``: its size, and every other level of a friction.
 
-    A size of either sign may become 0 or negative; a positive size is multiplied by at least 0.3.
+    A size of either sign may become 0 or negative; a positive size is multiplied by at least ``LEAST_TIMES``.
     """
     items, values = model.library[name].parameters, dict(model.effects)[name]
     levels = [k == 0 or (model.library[name].is_dry and item.unit == items[0].unit) for k, item in enumerate(items)]
-    size = min(max(times, 0.3 if items[0].positive else -3.0), 3.0)
+    size = min(max(times, LEAST_TIMES if items[0].positive else -MOST_TIMES), MOST_TIMES)
     return tuple(value * (size if level else 1.0) for value, level in zip(values, levels, strict=True))
 
 

@@ -28,7 +28,9 @@ AT_NOISE = 3.5  # held-out innovation over encoder noise up to which an effect e
 BETTER = 2.0  # least ratio of the innovation without the effect to that with it
 CLEAN = 1.6  # innovation over noise up to which it contains hardly anything else;
 BETTER_AT_NOISE = 1.03  # replaces BETTER there: a gap of one encoder count gives 1.04 to 1.07
-TELLING = 0.005  # dry friction over rms voltage above which it is named
+TELLING = 0.005  # dry friction over rms voltage above which it is named,
+ERRORS = 5.0  # if it is this many standard errors
+SETTLING = 0.5  # s until a filter has forgotten its start
 
 FILTER_WORK = 4.0  # samples times sub-steps of Stribeck friction that are simulated in the time that the filter takes for one sample
 
@@ -144,7 +146,7 @@ def as_companions(data: AxisData, library: Library, others: Others) -> Companion
 
 def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[str], found: FilterFit) -> GreyboxFit:
     error = found.innovation * data.sampling_rate
-    settled = min(int(0.5 * data.sampling_rate), data.training // 4)
+    settled = min(int(SETTLING * data.sampling_rate), data.training // 4)
     held = float(np.sqrt(np.mean(error[data.training :] ** 2)))
     noise_floor = found.noise * data.sampling_rate
     worse = held if found.too_small else error_without(data, found)
@@ -152,7 +154,7 @@ def _result(data: AxisData, library: Library, effect: Effect, names: Sequence[st
     far = max(held / (AT_NOISE * noise_floor), 0.0 if explains_all else BETTER * held / worse)
     rows: list[tuple[str, tuple[float, ...], tuple[float, ...]]] = [(effect.name, bounded(effect, found.values, data.similar), found.spread)]
     for law, its, errors in found.dry.rows():
-        if its[0] > TELLING * float(np.std(data.voltage)) and its[0] > 5.0 * errors[0]:
+        if its[0] > TELLING * float(np.std(data.voltage)) and its[0] > ERRORS * errors[0]:
             rows.append((law.name, bounded(law, its, data.similar), errors))
     values, spread = iter(found.companions[0]), iter(found.companions[1])
     rows += [(name, tuple(next(values) for _ in library[name].names), tuple(next(spread) for _ in library[name].names)) for name in names]

@@ -21,12 +21,14 @@ from xy_sysid.samples.block import FloatArray
 
 CUTOFFS = (10.0, 40.0)  # Hz: slow machines move below the first, quick ones up to the second
 REST = 0.2  # fraction of the velocity's standard deviation below which friction may hold the axis
+HIGHEST_CUTOFF = 0.2  # of the sampling rate
+ENDS = 50  # a fiftieth of the samples at each end is left out, because a transform takes them for neighbours
 FEW = 0.05  # least fraction of samples in motion; otherwise all samples are used
 
 
 def cutoffs(sampling_rate: float) -> list[float]:
-    """Hz, of the low-passes for this sampling rate: at most a fifth of it."""
-    return sorted({min(cutoff, 0.2 * sampling_rate) for cutoff in CUTOFFS})
+    """Hz, of the low-passes for this sampling rate."""
+    return sorted({min(cutoff, HIGHEST_CUTOFF * sampling_rate) for cutoff in CUTOFFS})
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +134,9 @@ class LowPass:
         return np.asarray(scipy.fft.irfft(kept * (1j * self.turn if derived else 1.0), self.size) * (self.size / self.samples))
 
     def inside(self) -> NDArray[np.bool_]:
-        """(size,) False near the ends, which the transform treats as neighbours."""
+        """(size,) False near the ends."""
         rows = np.ones(self.size, dtype=np.bool_)
-        ends = max(self.size // 50, 1)
+        ends = max(self.size // ENDS, 1)
         rows[:ends] = rows[-ends:] = False
         return rows
 

@@ -13,6 +13,10 @@ from xy_sysid.samples.block import FloatArray
 
 POLES = np.geomspace(3.0, 5000.0, 80)  # rad/s
 FEWEST_LINES = 16.0  # least samples of a window, for low sampling rates or short data
+SURE = 0.9999  # a coherence counts as no more, or one line would decide
+HIGHEST = 0.35  # of the sampling rate: lines of a frequency response
+WEAKEST = 1e-3  # power of a line of the input over the largest
+PARTS = 4.0  # windows at least
 LONGEST_DELAY = 40  # samples; a longer delay needs a start value
 
 
@@ -27,16 +31,16 @@ def mean_velocity_filter(gain: float, pole: float, sampling_rate: float) -> tupl
 
 def base_start(sampling_rate: float, voltage: FloatArray, velocity: FloatArray) -> tuple[float, float, float]:
     """(gain m/s/V, delay s, pole rad/s) from a held voltage (n,) and the mean velocity of each sample (n,)."""
-    length = int(2 ** np.floor(np.log2(max(min(2.0 * sampling_rate, voltage.size / 4.0), FEWEST_LINES))))
+    length = int(2 ** np.floor(np.log2(max(min(2.0 * sampling_rate, voltage.size / PARTS), FEWEST_LINES))))
     frequency, cross = scipy.signal.csd(voltage, velocity, sampling_rate, "hann", length)
     power = scipy.signal.welch(voltage, sampling_rate, "hann", length)[1]
     output = scipy.signal.welch(velocity, sampling_rate, "hann", length)[1]
     response = cross / np.maximum(power, 1e-300)
-    coherence = np.clip(np.abs(cross) ** 2 / np.maximum(power * output, 1e-300), 0.0, 0.9999)
-    used = (frequency > 0.0) & (frequency < 0.35 * sampling_rate)
+    coherence = np.clip(np.abs(cross) ** 2 / np.maximum(power * output, 1e-300), 0.0, SURE)
+    used = (frequency > 0.0) & (frequency < HIGHEST * sampling_rate)
     f, measured = frequency[used], response[used]
     weight = coherence[used] / (1.0 - coherence[used]) / np.maximum(np.abs(measured) ** 2, 1e-300)
-    weight *= power[used] > 1e-3 * np.max(power)
+    weight *= power[used] > WEAKEST * np.max(power)
     turn = 2j * np.pi * f / sampling_rate
     delays = np.arange(0.0, LONGEST_DELAY, 0.1)
     shift = np.exp(np.outer(turn, delays))  # (lines, delays)

@@ -14,6 +14,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.samples.block import FloatArray
 
 ORDER = 60  # number of past samples that predict the next: 30 ms at 2 kHz
+SAMPLES = 4  # least number of fitted samples for each of these
 RIDGE = 1e-12  # relative to the power, for an exactly predictable error
 
 
@@ -49,7 +50,7 @@ def whitened_rms(error: FloatArray, held: NDArray[np.bool_], order: int = ORDER)
 def enough(held: NDArray[np.bool_], order: int = ORDER) -> bool:
     """True if there are enough samples to fit an autoregressive model and to judge it; held: (n,) True for held-out samples."""
     runs, judged = _used(held, order)
-    return order >= 1 and sum(b - a - order for a, b in runs) >= 4 * order and bool(np.any(judged))
+    return order >= 1 and sum(b - a - order for a, b in runs) >= SAMPLES * order and bool(np.any(judged))
 
 
 def _used(held: NDArray[np.bool_], order: int) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:

@@ -31,6 +31,10 @@ BUCKETS = 300  # of a signal in time
 SPEED_BINS, POSITION_BINS, TIME_BINS = 24, 60, 30
 ZOOM, ZOOM_MOST = 0.5, 600  # s, samples
 WINDOW = 2.0  # s
+SHORTEST, PARTS = 16.0, 4.0  # samples of such a window, and windows, at least
+FAINTEST = 0.03  # of a magnitude: lower end of its band, so that it has a logarithm
+SMOOTH = 0.002  # s, over which an error is averaged to find the largest
+SETTLING = 0.5  # s in which the simulation may still start from rest
 TOP = 0.45  # of the sampling rate
 COHERENT = 0.3  # least coherence of a trusted point
 
@@ -119,7 +123,7 @@ def measured(data: AxisData, base: GreyboxFit) -> Measured:
     return Measured(
         frequency=_mean(response.frequency, np.ones_like(weight), point),
         magnitude=_db(size),
-        magnitude_low=_db(np.maximum(size - spread, 0.03 * size)),
+        magnitude_low=_db(np.maximum(size - spread, FAINTEST * size)),
         magnitude_high=_db(size + spread),
         phase=phase,
         phase_low=phase - turn,
@@ -238,7 +242,7 @@ def _below(values: FloatArray, end: float, sampling_rate: float) -> FloatArray:
 
 def _response(data: AxisData, position: FloatArray) -> FrequencyResponse:
     longest = max(run.stop - run.start for run in data.runs)
-    length = 2 ** int(np.log2(max(min(WINDOW * data.sampling_rate, longest / 4.0), 16.0)))
+    length = 2 ** int(np.log2(max(min(WINDOW * data.sampling_rate, longest / PARTS), SHORTEST)))
     shape = WindowShape.of("hann", length, 0.5)
     firsts = np.cumsum([0, *(-(-(run.stop - run.start) // shape.hop) * shape.hop for run in data.runs)])  # each starts with a window
     runs = [(int(first), data.voltage[run], position[run]) for first, run in zip(firsts, data.runs, strict=False)]
@@ -309,9 +313,9 @@ def _means(values: FloatArray) -> FloatArray:
 def _zoom(data: AxisData, base: GreyboxFit) -> tuple[int, int]:
     """The samples around the largest error that is not encoder noise."""
     width = min(int(ZOOM * data.sampling_rate), ZOOM_MOST, min(step.stop - step.start for step in data.steps))
-    smooth = max(int(0.002 * data.sampling_rate), 1)
+    smooth = max(int(SMOOTH * data.sampling_rate), 1)
     power = scipy.signal.oaconvolve(base.error, np.full(smooth, 1.0 / smooth), mode="same") ** 2
-    skip = min(int(0.5 * data.sampling_rate), power.size // 4)  # the simulation starts from rest
+    skip = min(int(SETTLING * data.sampling_rate), power.size // 4)
     worst = skip + int(np.argmax(power[skip:]))
     within = next(step for step in data.steps if worst < step.stop)  # within one recording
     start = min(max(worst - width // 2, within.start), within.stop - width)
