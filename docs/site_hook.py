@@ -33,13 +33,13 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Any, files: Files, config: Any, **_: Any) -> str:
     """A script of the gallery below its link, as a notebook with its outputs where it runs alone; links out of docs/ become plain words.
 
-    Equations of the theory become MathML, which browsers draw by themselves.
+    Equations of the theory become MathML, which browsers draw by themselves; in a span, or one that begins a line would begin a paragraph.
     """
     if page.file.src_uri == "gallery.md":
         return PLOTLY + re.sub(r"^\[.*?\]\(examples/(\w+)\.py\).*$", lambda found: _shown(found, files, config), markdown, flags=re.MULTILINE)
     if page.file.src_uri == "theory.md":
         markdown = re.sub(r"\$\$(.+?)\$\$", lambda found: latex(found.group(1), display="block"), markdown, flags=re.DOTALL)
-        markdown = re.sub(r"\$([^$\n]+)\$", lambda found: latex(found.group(1)), markdown)
+        markdown = re.sub(r"\$([^$\n]+)\$", lambda found: f"<span>{latex(found.group(1))}</span>", markdown)
     return re.sub(r"\[([^]]+)\]\(\.\./[^)]+\)", r"\1", markdown)
 
 

@@ -7,14 +7,16 @@ import subprocess
 import sys
 from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
+import plotly.io
 import pytest
 
 import xy_sysid as xy
-from xy_sysid.report.notebook import whole
+from xy_sysid.report.offline import whole
 
 ROOT = Path(__file__).parents[1]
 RATE = 500.0
@@ -248,6 +250,23 @@ def test_too_little_data_is_an_answer_and_no_error() -> None:
     """The error names the missing part."""
     still = xy.Recording.from_arrays(RATE, np.ones(2000), np.zeros(2000)).run("x")
     assert xy.diagnose(still).verdict == "not_enough_data"
+
+
+def test_a_picture_that_is_shown_in_a_notebook_is_kept_without_a_network(run: xy.Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the last line of a cell and by show(): for the notebook as Plotly's figure, for its export as vectors."""
+    kept: list[dict[str, str]] = []
+    display = ModuleType("IPython.display")
+    monkeypatch.setattr(display, "display", lambda bundle, raw: kept.append(bundle), raising=False)
+    monkeypatch.setitem(sys.modules, "IPython", ModuleType("IPython"))
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    monkeypatch.setattr(plotly.io.renderers, "default", "plotly_mimetype")
+    figure = xy.plot.coherence(xy.frf(run, length=1024))
+    figure.show()
+    figure._ipython_display_()
+    for bundle in kept:
+        assert set(bundle) == {"application/vnd.plotly.v1+json", "text/html"}
+        assert "<svg" in bundle["text/html"] and "<script" not in bundle["text/html"]
+    assert len(kept) == 2
 
 
 def test_without_matplotlib_a_picture_of_a_notebook_brings_plotly_along(monkeypatch: pytest.MonkeyPatch) -> None:

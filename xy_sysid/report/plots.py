@@ -16,6 +16,7 @@ from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.report import story_progress
 from xy_sysid.report.coupling import coupling_figure
 from xy_sysid.report.figures import coherence_figure, response_figure
+from xy_sysid.report.offline import picture
 from xy_sysid.report.parts import decibel, phase_of, plain
 from xy_sysid.report.story_parts import drawing
 from xy_sysid.report.theme import FLOOR
@@ -52,23 +53,23 @@ def bode(frf: FrequencyResponse, *others: FrequencyResponse | AnyModel) -> go.Fi
             figure.add_scatter(
                 x=lines.frequency, y=values, mode="lines", line=line, name=name, legendgroup=f"{number}", showlegend=row == 1, row=row, col=1
             )
-    return figure
+    return picture(figure)
 
 
 def coherence(frf: FrequencyResponse) -> go.Figure:
     """Coherence of every line; lines that no fit uses are small crosses."""
-    return coherence_figure({frf.origin.axis or "measured": frf}, IdentifierSettings().min_coherence)
+    return picture(coherence_figure({frf.origin.axis or "measured": frf}, IdentifierSettings().min_coherence))
 
 
 def coupling(found: Coupling) -> go.Figure:
     """Coupling of two axes in each band, with its 95 % limit, in per cent of the axis's own motion."""
-    return coupling_figure(found)
+    return picture(coupling_figure(found))
 
 
 def ladder(found: Answer) -> go.Figure:
     """Training error, held-out error and noise floor of each step of ``diagnose`` or ``refine``, as a falling staircase."""
     units = {"input": found.units.input, "output": found.units.output, "judged": found.units.judged}
-    return story_progress.ladder({"ladder": [rung_document(rung) for rung in found.rungs], "sentence": found.sentence, "units": units})
+    return picture(story_progress.ladder({"ladder": [rung_document(rung) for rung in found.rungs], "sentence": found.sentence, "units": units}))
 
 
 def residual(data: Run | Recording | Comparison, *models: AnyModel) -> go.Figure:
@@ -92,4 +93,4 @@ def residual(data: Run | Recording | Comparison, *models: AnyModel) -> go.Figure
     figure.add_hline(y=1.0, line={"color": FLOOR, "width": 2, "dash": "dot"}, row=1, col=1)
     figure.update_xaxes(title_text="frequency (Hz)", type="log", row=1, col=1)
     figure.update_yaxes(title_text="error over the noise floor", type="log", row=1, col=1)
-    return figure
+    return picture(figure)
