@@ -79,7 +79,7 @@ def residual_correlation(document: Document, step: int | None = None, mode: str 
     for at, by, name, bound, title in curves:
         time, value, limit = row(picture[by]), row(picture[name]), float(picture[bound])
         beyond = np.abs(value) > limit
-        for chosen, colour, said in ((~beyond, UNTRUSTED, "as of unrelated signals"), (beyond, FAILS, "beyond chance")):
+        for chosen, colour, said in ((~beyond, UNTRUSTED, "within chance"), (beyond, FAILS, "beyond chance")):
             figure.add_bar(
                 x=time[chosen], y=value[chosen], marker={"color": colour, "line": {"width": 0}}, name=said, legendgroup=said,
                 showlegend=at == 2, row=at, col=1,
@@ -109,10 +109,11 @@ def _against(document: Document, kind: str, step: int | None, mode: str) -> go.F
     ratio_axis(figure, [ratio])
     floor_line(figure)
     places = [item for item in shown["pictures"]["failing"] if item["kind"] == kind and item["to"] > item["from"]]
-    if kind == "speed":  # a place is a range of |speed|; the figure has signed velocity
-        places += [{**item, "from": -item["to"], "to": -item["from"]} for item in places]
     if by.size > 1:
         shade(figure, places, (float(by[0]), float(by[-1])), log=False, scale=scale)
+    if by.size > 1 and kind == "speed":  # a place is a range of |speed|; the figure has signed velocity
+        mirrored = [{**item, "from": -item["to"], "to": -item["from"]} for item in places]
+        shade(figure, mirrored, (float(by[0]), float(by[-1])), log=False, scale=scale, named=0)
     if kind == "time":
         shade_held_out(figure, document, shown, at=(1, 2))
     least = LEAST * faster * float(shown["noise_floor"])

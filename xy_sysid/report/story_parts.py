@@ -71,15 +71,17 @@ def floor_line(figure: go.Figure, at: int = 1, label: str = "noise floor") -> No
     )  # fmt: skip
 
 
-def shade(figure: go.Figure, places: list[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0) -> None:
-    """Shade failing places and label the first NAMED with their size, each on its own line; ends: of the axis, in the document's unit."""
+def shade(
+    figure: go.Figure, places: Sequence[Mapping[str, Any]], ends: tuple[float, float], log: bool, scale: float = 1.0, named: int = NAMED
+) -> None:
+    """Shade failing places and label the first ``named`` with their size, each on its own line; ends: of the axis, in the document's unit."""
     low, high = ends
     for level, item in enumerate(places):
         first, last = max(float(item["from"]), low), min(float(item["to"]), high)
         if not last >= first:
             continue
         stretches(figure, [(first * scale, last * scale)], fade(FAILS, 0.13), row=1, line={"color": fade(FAILS, 0.5), "width": 1})
-        if level >= NAMED:
+        if level >= named:
             continue
         middle = np.log10(np.sqrt(first * last) * scale) if log else 0.5 * (first + last) * scale
         left, right = (np.log10([low, high]) if log else np.array([low, high])) + (np.log10(scale) if log else 0.0)

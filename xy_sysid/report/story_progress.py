@@ -109,9 +109,14 @@ def before_after(document: Document, first: int = 0, last: int | None = None, mo
 
 
 def candidates(document: Document, mode: str = "light", most: int = 8) -> go.Figure:
-    """The held-out error with each candidate, smallest first, with its evidence on hover; dotted: noise floor, dashed: without a candidate."""
+    """The held-out error with each candidate, smallest first, with its evidence on hover; dotted: noise floor, dashed: without a candidate.
+
+    most: bars; those of named effects are always there
+    """
     named = list(document["effects"])
-    tried = sorted(document["candidates"], key=lambda item: (float(f"{item['held_out_error']:.2g}"), item["effect"] not in named))[:most]
+    tried = sorted(document["candidates"], key=lambda item: (float(f"{item['held_out_error']:.2g}"), item["effect"] not in named))
+    kept = {item["effect"] for item in [*(item for item in tried if item["effect"] in named), *tried][:most]}
+    tried = [item for item in tried if item["effect"] in kept]
     if not tried:
         return nothing("No candidate was tried: " + str(document["sentence"]), mode)
     scale, unit = speed_unit(document)

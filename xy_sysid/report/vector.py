@@ -9,6 +9,7 @@ import functools
 import io
 import re
 import tempfile
+import textwrap
 from collections.abc import Mapping, Sequence
 from html import unescape
 from types import ModuleType
@@ -36,6 +37,7 @@ LETTERS = (  # Unicode ranges, end excluded; other characters come from DejaVu S
     (0x2264, 0x2266),
 )  # fmt: skip
 BAR = 0.85  # bar width as a fraction of the spacing
+NAME = 20  # letters in a line of a bar's name
 DECADES = 1.6  # a logarithmic axis with fewer decades also has labels at 2 and 5
 
 
@@ -161,11 +163,13 @@ def _bars(ax: Axes, trace: Any, together: Sequence[Any]) -> None:
     if trace.orientation != "h":
         places = np.unique(np.concatenate([_numbers(each.x) for each in together]))
         width = BAR * float(np.min(np.diff(places))) if places.size > 1 else BAR
-        ax.bar(_numbers(trace.x), _numbers(trace.y), width=width, color=colours, linewidth=0, label=label)
+        x, y = (_numbers(values) if len(trace.x) else np.array([np.nan]) for values in (trace.x, trace.y))  # the legend shows its colour
+        ax.bar(x, y, width=width, color=colours, linewidth=0, label=label)
         return
-    names, values = [_words(name) for name in trace.y], _numbers(trace.x)
-    bars = ax.barh(names, values, color=colours, label=label)
-    ax.bar_label(bars, [_words(text) for text in trace.text or [""] * len(names)], padding=2, fontsize=7.5)
+    names = ["\n".join(textwrap.wrap(_words(name), NAME)) for name in trace.y]
+    ax.barh(names, _numbers(trace.x), color=colours, label=label)
+    for name, text in zip(names, trace.text or (), strict=False):
+        ax.annotate(_words(text), (0.0, name), xytext=(2.0, 0.0), textcoords="offset points", va="center", fontsize=7.5, color=INK)
 
 
 def _shape(axes: Mapping[str, Axes], shape: Any) -> None:
