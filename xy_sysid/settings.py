@@ -234,7 +234,7 @@ class IdentifierSettings(Settings):
     input_unit: str = knob("V", "unit of the input, for example N m for an effort; shown in every answer")
     output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
     state_file: str = knob("", "file that keeps the spectra over a restart; empty: none")
-    save_every: float = knob(10.0, "seconds between two savings of the state", "s", gt=0.0, le=3600.0)
+    save_every: float = knob(10.0, "seconds between two saves of the state", "s", gt=0.0, le=3600.0)
     baseline: str = knob("", "model file of fit --model from commissioning, with which the newest estimates are compared; empty: none")
     baseline_table: str = knob("", "table of xy-sysid fleet, with the spread of the estimates between recordings; empty: 3 % for every parameter")
 

@@ -69,7 +69,7 @@ def main() -> int:
         sys.stdout.write(parts[-1] + "\n")
         sys.stdout.flush()
     if not asked and not short:
-        head = f"# Benchmarks\n\nMade by `make bench`; every ratio is from one run, side by side. {facts(*PACKAGES)}\n"
+        head = f"# Benchmarks\n\nMade by `make bench`; every ratio is from one run. {facts(*PACKAGES)}\n"
         PAGE.write_text("\n".join([head, *parts]), encoding="utf-8")
     return 0
 

@@ -1,9 +1,9 @@
 """Speed of reading bags, compared with deserializing message by message in the same run.
 
 The reference is the plain loop with rosbags: read, deserialize, take the numbers. Times are processor time of all threads, user and
-system, so that other work on the machine does not count. Of the time to stream
-blocks, a third is the kernel's copying of the file out of its cache. Our recorder writes sqlite3 files in pages of 32 KB,
-``ros2 bag`` in sqlite's usual 4 KB. Streams of sqlite3 include the check of our recorder's sums, for which the file is
+system, so that other work on the machine does not count. A third of the time
+to stream blocks is the kernel's copy of the file from its cache. Our recorder writes sqlite3 files in pages of 32 KB,
+``ros2 bag`` in sqlite's usual 4 KB. Streams of sqlite3 include the check of our recorder's checksums, for which the file is
 read once more before the first sample is passed on. Joint states with effort are numbered while they are streamed, as the nodes do.
 """
 
@@ -109,6 +109,6 @@ def run(report: Callable[[str], None], short: bool = False) -> Table:
     per_message = found["joint states, sqlite3"][0]
     rows = tuple((name, *(f"{x / 1e6:.2f}" for x in three), f"{three[1] / three[0]:.1f}x") for name, three in found.items())
     checks = tuple(at_least(f"{name}: streamed over its own loop", three[1] / three[0], 20.0) for name, three in found.items())
-    checks += (at_least("blocks (sqlite3) over the loop of one message a sample", found["blocks of 20, sqlite3"][1] / per_message, 20.0),)
+    checks += (at_least("blocks (sqlite3) over a loop with one message for each sample", found["blocks of 20, sqlite3"][1] / per_message, 20.0),)
     columns = ("bag", "loop, M samples/s", "streamed", "loaded and paired", "streamed over loop")
     return Table("Reading bags", __doc__.split("\n\n", 1)[-1], columns, rows, checks)

@@ -1,10 +1,11 @@
 """Transfer function with delay on 612 lines, compared with scipy.optimize.least_squares and vector fitting.
 
-The response is one of a minute of simulated data of the paper's machine (H1, Hann windows of 4096, 0.5 to 300 Hz). Every fit
-minimises the same cost: errors over sigma, the window's blur and the hold in the model. ``least_squares`` differentiates
-numerically, gets the model in coefficients of powers of s (scaled to 1 at the start) in the usual form, and
-starts from the same model, 10 per cent off. Vector fitting (scikit-rf) has no delay and no hold in its model and no weights:
-it may use more poles instead.
+The response is that of a minute of simulated data of the paper's machine (H1, Hann windows of 4096, 0.5 to 300 Hz). Every fit
+except vector fitting minimises the same cost: errors over sigma, of a model with the window's blur and the hold.
+*From the start*, *as live* and ``least_squares`` start from the true model with its parameters about 10 per cent off. *As live*
+stops at a relative change of 1e-6; *cold* has no start model. ``least_squares`` differentiates numerically; its parameters are
+coefficients of powers of s, scaled to 1 at the start. Vector fitting (scikit-rf) has no delay and no hold in its model and no
+weights: it may use more poles instead.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Simulated: an axis with an integrator, a pole at 4.8 Hz and a resonance of 60 Hz with 0.5 % damping (0.6 Hz wide) behind a hold, 1 kHz, white
 noise as input, 0.1 % of noise in the position; five seeds, lines of 1 to 300 Hz. Error: rms of |estimate / truth - 1| over the trusted
-lines. Bias: the mean of |estimate / truth| - 1 at the resonance. Sigma: rms of the error in its own standard deviations, 1 where it is
-right. From the same response a transfer function is fitted: the error of its resonance.
+lines. Bias: the mean of |estimate / truth| - 1 at the resonance. Error over sigma: rms of the error divided by its estimated standard
+deviation, 1 if sigma is right. From the same response a transfer function is fitted: the error of its resonance.
 
 Measured: a motor bench with a multisine of 2,500 samples; two periods, treated as any record, against the mean of the periods that were not used.
 """

@@ -1,6 +1,7 @@
 """Replay of five minutes of two axes.
 
-The identifier's logic on a bag (20-row blocks, sqlite3), a fit of both axes and of the short memory every 2 s of data, warm process.
+The identifier's logic on a bag (20-row blocks, sqlite3), a fit of both axes to all data and to the newest windows
+(for the resonance alarm) every 2 s of data, in a process in which everything is compiled.
 Times are processor time, user and system, so that other work on the machine does not count.
 The orders are chosen from the data at the first fit, which takes a fifth of the time, and judged again at the fits 2, 4, 8 and so on.
 """

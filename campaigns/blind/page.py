@@ -59,13 +59,16 @@ def text(results: dict[str, list[Judged]], draws: str, command: str, facts: str)
         "",
         "Development draws (another random stream) were used for tuning; reporting draws never were.",
         "",
+        "- **Dirt**: three to five small imperfections of a real machine ([machines](machines.md#what-is-simulated); quadratic drag counts as "
+        "one), scaled together to a fraction of the motion.",
         "- **Right**: the true effect is named first (`hard`: anywhere in the list; several effects: all of them). For a clean axis: "
         f"nothing is missing. For dirt alone and for effects outside the library: no effect is named with confidence {CONFIDENT:g} or more.",
         f"- **Phantom**: an effect that the axis does not have is named with confidence {CONFIDENT:g} or more, alone or together with the true one.",
         f"- **Wrong**: the first name is not one of the true effects, with confidence {CONFIDENT:g} or more.",
         f"- **Unseen**: an effect changes the motion by less than {100 * FAINT:.0f} % of the change by noise and dirt, and by less than the answer "
         "says could be hidden. It need not be named: the answer is right if all other effects are, and nothing that the axis does not have.",
-        "- **Hidden**: such an effect, and the answer is not right, or does not say that so large an effect could be hidden.",
+        "- **Hidden**: an effect changes the motion as little as that, but the answer is not right, or does not say that an effect of this size "
+        "could be hidden.",
         "- Effects are compared by their laws: asymmetric friction counts as Coulomb friction with a constant load, and every dry friction that "
         "slides contains Coulomb friction.",
         "- Seconds are processor time.",

@@ -11,8 +11,15 @@ HEAD = """# Effects
 All physical effects that a diagnosis can name. This page is made from `xy_sysid/effects/` by
 `python -m campaigns.documents.effects > docs/effects.md`; `xy-sysid effects` prints the same. Bounds and usual sizes are given for a machine with
 25 mm/s and 1 V rms at 2 kHz. They are scaled to the motion and the input of each recording. Forces are given in volts of the drive: the voltage that
-overcomes them. Multiply by the drive's force per volt to get newtons. F is a force against the drive, u_eff the voltage that acts, v velocity,
-x position. The base of every model is `v' = pole (gain u_eff - v)`. How to add your own: [your-own-effect.md](your-own-effect.md).
+overcomes them. Multiply by the drive's force per volt to get newtons. How to add your own: [your-own-effect.md](your-own-effect.md).
+
+The base of every model is `v' = pole (gain (u_eff - F) - v)`. F is a force against the drive, u_eff the voltage that acts, v velocity, x position,
+y the reading of the encoder; a prime is a time derivative. In the laws of resonances s is the Laplace variable, v_rigid the velocity without the
+resonance, d is `damping` and d_p is `pole_damping`. In `backlash` d is the depth of contact.
+
+Where an effect acts: `base`: a part of every model; `input`: changes the voltage; `state`: changes the voltage, and has states of its own;
+`force`: a force against the drive; `friction`: dry friction; `bristle`: all dry friction acts through it; `motion`: a linear filter of the
+motion; `encoder`: an error of the reading.
 
 | name | law | where it acts | look-alikes |
 |---|---|---|---|

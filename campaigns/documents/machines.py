@@ -15,7 +15,7 @@ from xy_sysid.settings import knobs
 _GROUPS: dict[Group, str] = {
     "base": "part of every model",
     "effect": "effects that a diagnosis should name",
-    "added": "effects that a diagnosis should name, and no seed draws",
+    "added": "further effects that a diagnosis should name (`draw` leaves them out)",
     "outside": "effects that are not in the library",
     "event": "changes during a run",
     "imperfection": "imperfections of every real machine",

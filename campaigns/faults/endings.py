@@ -18,8 +18,8 @@ from xy_sysid.imports import load, save
 
 WORDS = (
     "A signal at a random moment from the first instruction to the last: exit code 130 after Ctrl-C and 143 after SIGTERM, no traceback, and the "
-    "folder contains either the old content or the complete new file. Where the answer came first, the next signal comes in half the time. "
-    "Longest: from the signal to the end."
+    "folder contains either the old content or the complete new file. If the command ended before the signal, the next "
+    "signal comes in half the time. Longest: from the signal to the end."
 )
 RIGID = ("--set", "numerator_order=0", "--set", "denominator_order=2")
 COMMANDS: dict[str, tuple[tuple[str, ...], float]] = {

@@ -11,7 +11,7 @@ GROUPS = {
     "endings": "Ctrl-C, SIGTERM, kill -9",
     "strange": "Strange signals and effect files",
     "machine": "The machine, over DDS",
-    "door": "The page's door",
+    "door": "The page's server",
     "tabs": "The page under load",
     "network": "Two hosts",
     "shared": "Recordings of real machines",

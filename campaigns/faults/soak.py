@@ -120,7 +120,7 @@ def table(data: float, asked: argparse.Namespace, looks: Looks, streams: dict[st
         "",
         f"`python -m campaigns.faults soak --block {asked.block}`: {data:.2f} h of data (two axes, 2 kHz) in {minutes:.0f} min "
         f"through simulated machine, excitation and identifier over DDS, with the page and an open tab. "
-        f"Measured; the column of {asked.hours:.0f} h is the slope of the second half, drawn on.",
+        f"Measured; the column of {asked.hours:.0f} h extrapolates the slope of the second half.",
         "",
         "| node | MB at a fifth | MB at the end | descriptors at a fifth, end | MB an hour of data, second half | MB more in 24 h |",
         "|---|---|---|---|---|---|",

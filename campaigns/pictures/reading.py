@@ -51,8 +51,8 @@ friction and cogging cause motion that a linear response cannot explain. Without
 
 ## Where the model fails: one picture per effect
 
-The first picture shows a machine without a missing effect. Then each effect is added to the same machine. The model is always
-the *rigid* one: gain, delay and one pole. *Try it* gives the command that makes the recording `rec`;
+The first picture shows a machine without a missing effect. Each further picture adds one effect to this machine; gravity acts on a rotary joint
+instead. The model is always the *rigid* one: gain, delay and one pole. *Try it* gives the command that makes the recording `rec`;
 `xy-sysid report rec -o report.html` then draws its pictures.
 """
 
@@ -69,7 +69,7 @@ def picture(example: Example) -> str:
 
 def _section(example: Example) -> str:
     title = example.effect.replace("_", " ").capitalize() if example.effect else "Nothing is missing"
-    shows = "error over the floor by frequency, and " + " and ".join(_WORDS[made.__name__] for made in example.pictures[1:])
+    shows = "error over the floor by frequency, " + ", ".join(_WORDS[made.__name__] for made in example.pictures[1:])
     lines = [f"\n### {title}\n", f"![{title}: {shows}]({picture(example)})\n", f"{example.look}\n"]
     if example.effect:
         effect = EFFECTS[example.effect]

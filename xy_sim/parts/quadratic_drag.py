@@ -10,7 +10,7 @@ PART = Part(
     kind="friction",
     group="added",
     law="f = coefficient |v| v",
-    meaning="oil pushed through gaps, air under a bellow",
+    meaning="oil pushed through gaps, air under a bellows",
     source="Lord Rayleigh 1876; Worden & Tomlinson 2001, sec. 2.2.5",
     parameters=(Parameter("coefficient", "V/(m/s)2", 40.0, 20.0, 120.0, "drive voltage that overcomes it, per square of the speed"),),
 )

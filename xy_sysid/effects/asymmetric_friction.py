@@ -42,7 +42,7 @@ EFFECT = Effect(
     name="asymmetric_friction",
     law="F = coulomb (1 + asymmetry sign(v)) sign(v)",
     meaning="worn or tilted nut, one-sided wiper: more friction forth than back",
-    validity="speeds well above breakaway; one level in each direction; without backlash the same as Coulomb friction with a smaller constant load",
+    validity="speeds well above breakaway; one level each way; without backlash equal to Coulomb friction with a constant load below its level",
     source="Armstrong-Helouvry, Control of Machines with Friction, Kluwer 1991, ch. 3",
     category="friction",
     parameters=(

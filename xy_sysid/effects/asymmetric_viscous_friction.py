@@ -22,7 +22,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 EFFECT = Effect(
     name="asymmetric_viscous_friction",
-    law="F = (1 + asymmetry sign(v)) v / gain, where v / gain is the drag of the base",
+    law="F = asymmetry sign(v) v / gain, in addition to the drag v / gain of the base",
     meaning="seals, wipers and guides with more drag in one direction than in the other",
     validity="each direction has one drag coefficient; back-EMF, often most of the drag, has no asymmetry",
     source="Janot, Gautier & Brunot, Data set and reference models of EMPS, Nonlinear System Identification Benchmarks 2019",

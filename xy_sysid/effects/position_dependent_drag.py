@@ -22,7 +22,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 EFFECT = Effect(
     name="position_dependent_drag",
-    law="F = (1 + slope x) v / gain, where v / gain is the drag of the base, at x = 0",
+    law="F = slope x v / gain, in addition to the drag v / gain of the base",
     meaning="a guide or screw that is not quite straight or parallel, preload that grows towards one end, grease on part of the travel",
     validity="drag that rises steadily from one end to the other and never below zero; drag that is largest in the middle is not detected",
     source="Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), sec. 2 (position-dependent friction)",

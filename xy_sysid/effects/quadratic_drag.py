@@ -26,7 +26,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 EFFECT = Effect(
     name="quadratic_drag",
     law="F = coefficient |v| v",
-    meaning="fans, propellers and wheels in air, oil pushed through gaps, air under a bellow",
+    meaning="fans, propellers and wheels in air, oil pushed through gaps, air under a bellows",
     validity="turbulent flow: fast motion; negligible at crawling speed",
     source="Worden & Tomlinson, Nonlinearity in Structural Dynamics, 2001, sec. 2.2.5",
     category="force",

@@ -39,7 +39,7 @@ EFFECT = Effect(
     name="saturation",
     law="u_eff = clip(u, -limit, limit)",
     meaning="supply or current limit of the drive",
-    validity="the same limit on both sides, without memory; limit 0 means none",
+    validity="the same limit on both sides, without memory",
     source="Khalil, Nonlinear Systems, 3rd ed., sec. 1.2.7",
     category="input",
     parameters=(Parameter("limit", "V", 1e-3, 1e6, 1.5, "largest output"),),

@@ -51,7 +51,7 @@ _RESPONSE = (
     Column("tf_denominator", "text", "", "the same of the denominator"),
     Column("tf_trustworthy", "truth", "", "the data determine it, and noise nearly explains its residual error"),
     Column("tf_relative_error", "number", "", "rms of the error over the magnitude, line by line"),
-    Column("tf_misfit", "number", "", "factor by which the intervals of noise alone are too narrow; it is in the intervals below"),
+    Column("tf_misfit", "number", "", "factor by which the intervals of noise alone are too narrow; the intervals below include it"),
 )
 _DIAGNOSIS = (
     Column("verdict", "text", "", "missing_effect, nothing_missing, not_in_library or not_enough_data"),

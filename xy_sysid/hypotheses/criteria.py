@@ -43,20 +43,20 @@ DOUBTFUL = _number("doubtful", 0.1, "1", "a rival is mentioned if it predicts as
 SIZE = _number("size", 0.7, "1", "least size of an effect; an unmodelled force could imitate a smaller one")
 RICHER = _number("richer", 0.25, "1", "least size of a richer law compared with the simpler one that it replaces")
 WIDTH = _number("width", 6, "moves", "most replacements, and most pairs, from one set; the true one was among the first four")
-ALMOST = _number("almost", 0.7, "1", "two gains or sizes of a higher ratio count as equal: dry friction is named first, and a pair adds nothing")
+ALMOST = _number("almost", 0.7, "1", "above this ratio two gains or sizes count as equal: dry friction is named first, and no pair is tried")
 OPTIMISM = _number("optimism", 3.0, "1", "a fit gains at most this multiple of its first-order prediction")
 HOPELESS = _number(
     "hopeless", 1.5, "nats a line", "a fit to part of the data stops if it is this far behind after one round; no such fit came near the best"
 )
-NEAR = _number("near", 0.03, "1", "a set whose score on part of the data is within this part of the best gain is fitted to all data")
+NEAR = _number("near", 0.03, "1", "a set whose score on part of the data is within this fraction of the best gain is fitted to all data")
 AT_FLOOR = _number("at the floor", 0.2, "nats a line", "below this the error is noise; clean axes have 0.03, the weakest effects 1")
 LEAST = _number("least one step ahead", 0.03, "nats", "least gain in log error power; repeated fits agree within 0.02")
 OPTIMISM_AHEAD = _number("optimism one step ahead", 5.0, "1", "optimism for gains one step ahead, with backlash")
 ALIKE = _number("alike one step ahead", 0.7, "1", "with backlash, effects that promise this part of the best gain are fitted")
-TELLS = _number("tells", 0.15, "nats", "least gain of backlash in log error power; filters otherwise differ by less")
+TELLS = _number("tells", 0.15, "nats", "least gain of backlash in log error power; without backlash, filters differ by less")
 FILTERED = (1.0 + SIZE) ** -0.5  # innovation of a filter over that of the best simulation with an autoregressive error: the same size
 STILL = _number("still", 0.1, "1", "a window with less than this part of the strongest motion is at standstill")
-FEWEST = _number("fewest", 3, "1", "least number of input tones, excited bands and moving held-out windows (twice as many to fit)")
+FEWEST = _number("fewest", 3, "1", "least number of input tones, excited bands and moving held-out windows (twice as many fitted windows)")
 MOST_EFFECTS = _number("most effects", 4, "1", "most effects in a model; blind tests have three, one real machine needs four")
 WORK = 1.5e8  # samples times sub-steps simulated for one axis, about 10 s, the default budget: a limit for the waiting time, not a criterion
 WORK_EACH = 400.0  # the same for each sample of the record, so that long records are searched as far as short ones
