@@ -27,7 +27,6 @@ __all__ = [
     "WalledNode",
     "declare",
     "run_node",
-    "settings_from_parameters",
 ]
 
 NAMESPACE = "/xy"
@@ -105,12 +104,6 @@ def overrides(node: Node) -> dict[str, Any]:
     """Parameters from the command line or a file, for a node made with automatically_declare_parameters_from_overrides."""
     given = cast("dict[str, Parameter]", node.get_parameters_by_prefix(""))
     return {name: parameter.value for name, parameter in given.items() if not name.startswith(OF_ROS)}
-
-
-def settings_from_parameters(node: Node, cls: type[AnySettings]) -> AnySettings:
-    """The settings with the node's given parameter values; raises BadInput if they are inconsistent."""
-    known = {item.name for item in knobs(cls())}
-    return build(cls, {name: value for name, value in overrides(node).items() if name in known}, f"node {node.get_name()}")
 
 
 def declare(
