@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.simulated import recorded as recorded_machine
 
-from campaigns.bench.settle import table
+from campaigns.bench.settle import settle, table
 from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, left_limits, limits, machine
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.diagnosis.answer import Answer
@@ -21,7 +21,7 @@ from xy_sysid.experiment_design.design import Design, Judged, _timed, best_first
 from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, Question, Signals, settle
+from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, Question, Signals
 from xy_sysid.experiment_design.of_run import next_experiment
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded, seen
