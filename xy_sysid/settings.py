@@ -16,6 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
+NAMESPACE = "/xy"  # of the topics, and of the nodes unless a run file says otherwise
 Names = Annotated[list[str], BeforeValidator(lambda value: value.split(",") if isinstance(value, str) else value)]
 CHOICE = re.compile(r"'([^']*)'")
 SIGNS = {"ge": ">= ", "gt": "> ", "le": "<= ", "lt": "< ", "expected": ""}  # how a limit that was broken is told

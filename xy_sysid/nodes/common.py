@@ -15,7 +15,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.nodes.quality import Overridable
 from xy_sysid.nodes.run import run_node
 from xy_sysid.nodes.wall import Wall
-from xy_sysid.settings import AXES, Knob, Settings, build, changed, knobs, of_other_axes, unknown_name
+from xy_sysid.settings import AXES, NAMESPACE, Knob, Settings, build, changed, knobs, of_other_axes, unknown_name
 
 __all__ = [
     "DATA_QOS",
@@ -29,7 +29,6 @@ __all__ = [
     "run_node",
 ]
 
-NAMESPACE = "/xy"
 AnySettings = TypeVar("AnySettings", bound=Settings)
 
 # Ten seconds of 20-row blocks at 2 kHz: queues overflow without an error, so they are longer than any stall.
