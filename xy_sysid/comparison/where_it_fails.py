@@ -18,8 +18,8 @@ import numpy as np
 import scipy
 
 from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import EPSILON
 from xy_sysid.greybox.floor import Floor, Windows, bands, encoder_noise, floor
-from xy_sysid.greybox.free_run import EPSILON
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units, motion, moved, told
 
