@@ -3,6 +3,7 @@
 criteria:    every threshold of the search, with its reason
 limits:      the limits of the machine
 experiment:  one experiment: excitation and duration
+as_trajectory: the same for a robot that accepts only trajectories
 proposals:   the experiments that are compared
 beliefs:     a set of effects with its parameters and their uncertainty
 rivals:      the sets that the present data do not rule out
