@@ -43,6 +43,12 @@ def pair(zero: float, zero_damping: float, pole: float, pole_damping: float, fs:
     return b0, b0 * b1, b0 * b2, a1, a2
 
 
+@law
+def section(split: float, frequency: float, damping: float, pole_damping: float, fs: float) -> tuple[float, float, float, float, float]:
+    """The pair of an effect: its resonance is ``split`` above its antiresonance ``frequency`` (Hz)."""
+    return pair(frequency, damping, frequency * (1.0 + split), pole_damping, fs)
+
+
 def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
     """The most likely pairs with poles between ``low`` and ``high`` (Hz)."""
     for trace, frequency in traces(scene, low, high):
