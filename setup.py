@@ -60,7 +60,6 @@ setup(
         "mujoco": ["mujoco"],
         "fleet": FLEET,
         "bench": ["scikit-rf", "pyFRF"],
-        "foreign": ["mujoco"],
         "test": [
             "matplotlib",
             "pandas",
@@ -76,7 +75,6 @@ setup(
             "mypy",
             "scipy-stubs",
             "types-PyYAML",
-            "types-setuptools",
             "pre-commit",
             "joblib",
             "control",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import fnmatch
 import functools
 import graphlib
 import re
@@ -242,3 +243,20 @@ def test_no_file_names_a_host_to_install_from_or_a_path_of_one_machine() -> None
         text = path.read_bytes().decode("utf-8", "replace")
         found = forbidden.search(text)
         assert found is None, f"{name}, line {text[: found.start()].count(chr(10)) + 1}: {found.group()}"
+
+
+def test_the_docstring_of_a_package_lists_its_modules() -> None:
+    """A list names every module of its folder, and nothing else. Effects list only their shared tools."""
+    wrong = []
+    for path in sources("xy_sysid"):
+        text = ast.get_docstring(tree_of(path)) if path.name == "__init__.py" else None
+        body = (text or "").partition("\n")[2]
+        listed = {name for line in re.findall(r"^ *(\w[\w*]*(?:, \w[\w*]*)*): +\S", body, re.MULTILINE) for name in line.split(", ")}
+        if not listed:
+            continue
+        inside = [one.relative_to(path.parent) for one in sources("xy_sysid") if one.is_relative_to(path.parent)]
+        there = {one.parts[0].removesuffix(".py") for one in inside}
+        said = [] if path.parent.name == "effects" else re.findall(r"[\w*]+", body)
+        missing = {name for name in there if said and name[0] != "_" and not any(fnmatch.fnmatchcase(name, word) for word in said)}
+        wrong += [f"{path.parent.name}: {name}" for name in sorted(missing | {name for name in listed if not fnmatch.filter(there, name)})]
+    assert not wrong

@@ -9,11 +9,6 @@ from xy_sim.machine import Machine
 from xy_sim.machine_file import read
 
 
-def hidden(seed: int, clean: bool = False) -> Machine:
-    """The machine of hidden.yaml for this seed."""
-    return Machine.from_file("hidden.yaml", seed, clean)
-
-
 def draw(seed: int, effects: Effects = (1, 3), machine: str | Path = "rigid.yaml", scale: float = 1.0, clean: bool = False) -> Machine:
     """A machine with effects drawn for each axis.
 

@@ -18,9 +18,3 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
     """The same function, callable from Python and from compiled code; forced inlining makes the kernel a quarter faster."""
     compilable: Callable[P, R] = register_jitable(forceinline=True)(function)
     return compilable
-
-
-def called(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile the function without inlining, so that parts that few machines need do not slow the kernel down."""
-    compilable: Callable[P, R] = register_jitable(function)
-    return compilable

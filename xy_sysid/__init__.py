@@ -18,6 +18,7 @@ Packages in the order of the data; each imports only from those before it.
 
     samples, excitation:       recorded samples, and signals that drive the machine
     response, linear, fitting: windows and spectra to a frequency response, transfer functions, their fits and verdicts
+    time_models:               small models for short tests
     effects, axis, greybox:    physical effects, simulation of an axis with effects, its fit
     comparison:                where a model fails
     hypotheses, diagnosis:     which effect is missing
@@ -30,7 +31,7 @@ Packages in the order of the data; each imports only from those before it.
     paper:                      the paper's study
     front_door:                wrappers of the public functions
 
-All packages may import ``errors``, ``settings``, ``units`` and ``jit``. The names of ``__all__`` are public, and each is loaded
+All packages may import ``errors``, ``settings``, ``units``, ``tables`` and ``jit``. The names of ``__all__`` are public, and each is loaded
 when it is first used; all other modules may change.
 """
 

@@ -39,13 +39,13 @@ def tell_compiling(begins: Callable[[], None], ends: Callable[[], None] = lambda
     """
     deep = 0
 
-    def on_start(listener: object, happening: object) -> None:
+    def on_start(_listener: object, _happening: object) -> None:
         nonlocal deep
         deep += 1
         if deep == 1:
             begins()
 
-    def on_end(listener: object, happening: object) -> None:
+    def on_end(_listener: object, _happening: object) -> None:
         nonlocal deep
         deep -= 1
         if deep == 0:

@@ -16,6 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from xy_sysid.errors import BadInput
 from xy_sysid.units import Units
 
+NAMESPACE = "/xy"  # of the topics, and of the nodes unless a run file says otherwise
 Names = Annotated[list[str], BeforeValidator(lambda value: value.split(",") if isinstance(value, str) else value)]
 CHOICE = re.compile(r"'([^']*)'")
 SIGNS = {"ge": ">= ", "gt": "> ", "le": "<= ", "lt": "< ", "expected": ""}  # how a limit that was broken is told
@@ -185,12 +186,32 @@ class ExcitationSettings(Settings):
         return self.output == "commands" and self.interface == "position"
 
 
-def _units(input_unit: str, output_unit: str, output: str) -> Units:
-    """Of input and position; whoever has named the unit of a velocity, rad/s, has said that of its integral."""
-    return Units(input_unit, output_unit.removesuffix("/s") if output == "velocity" else output_unit)
+class StreamSettings(Settings):
+    """The streams of samples that a node receives."""
+
+    source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
+    output: Literal["position", "velocity"] = knob(
+        "position", "with joint_state: the field that is the output; a velocity, of drives whose position is empty, NaN or wraps, is integrated"
+    )
+    effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
+    joints: Names = knob(
+        [""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without an entry has the name of its joint'
+    )
+    joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
+    effort_lag: int = knob(
+        0, "samples by which effort in joint states is older than its stamp; 1 if it is that of the previous cycle", "", ge=0, le=100
+    )
+    input_unit: str = knob("V", "unit of the input, for example N m for an effort; shown in every answer")
+    output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
+    reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
+
+    @property
+    def units(self) -> Units:
+        """Of input and position; whoever has named the unit of a velocity, rad/s, has said that of its integral."""
+        return Units(self.input_unit, self.output_unit.removesuffix("/s") if self.output == "velocity" else self.output_unit)
 
 
-class IdentifierSettings(Settings):
+class IdentifierSettings(StreamSettings):
     """Node ``identifier``, and every offline command that estimates."""
 
     window: Literal["hann", "hamming", "blackman", "blackmanharris", "flattop", "boxcar"] = knob("hann", "window of the spectra")
@@ -215,24 +236,9 @@ class IdentifierSettings(Settings):
     delay: bool = knob(True, "estimate a delay")
     hold: Literal["zoh", "none"] = knob("zoh", "how the voltage behaves between samples: held (zoh) or band-limited (none)")
     refit: float = knob(2.0, "seconds of data between two fits", "s", gt=0.0, le=3600.0)
-    reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
     frozen: float = knob(0.25, "an encoder that repeats one value for this long while the voltage moves counts as frozen", "s", gt=0.0, le=60.0)
     alarm_windows: int = knob(5, "number of newest windows from which the watched resonance is fitted", "", ge=3, le=1000)
     alarm_sigma: float = knob(4.0, "a resonance has moved if it is this many standard errors from its reference", "", ge=1.0, le=100.0)
-    source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
-    output: Literal["position", "velocity"] = knob(
-        "position", "with joint_state: the field that is the output; a velocity, of drives whose position is empty, NaN or wraps, is integrated"
-    )
-    effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
-    joints: Names = knob(
-        [""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without an entry has the name of its joint'
-    )
-    joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
-    effort_lag: int = knob(
-        0, "samples by which effort in joint states is older than its stamp; 1 if it is that of the previous cycle", "", ge=0, le=100
-    )
-    input_unit: str = knob("V", "unit of the input, for example N m for an effort; shown in every answer")
-    output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
     state_file: str = knob("", "file that keeps the spectra over a restart; empty: none")
     save_every: float = knob(10.0, "seconds between two saves of the state", "s", gt=0.0, le=3600.0)
     baseline: str = knob("", "model file of fit --model from commissioning, with which the newest estimates are compared; empty: none")
@@ -250,11 +256,6 @@ class IdentifierSettings(Settings):
         return self
 
     @property
-    def units(self) -> Units:
-        """Of input and output."""
-        return _units(self.input_unit, self.output_unit, self.output)
-
-    @property
     def orders(self) -> tuple[int, int]:
         """Of numerator and denominator: those asked for, or those of a rigid body with one resonance."""
         asked = self.numerator_order if self.numerator_order >= 0 else min(2, self.denominator_order or 2)
@@ -266,28 +267,13 @@ class IdentifierSettings(Settings):
         return self.numerator_order < 0 and self.denominator_order == 0
 
 
-class DiagnoserSettings(Settings):
+class DiagnoserSettings(StreamSettings):
     """Node ``diagnoser``."""
 
     memory: float = knob(120.0, "newest seconds without a gap that are kept and analysed", "s", ge=1.0, le=36_000.0)
     minimum: float = knob(10.0, "seconds without a gap that an analysis needs", "s", ge=0.5, le=36_000.0)
     interval: float = knob(0.0, "diagnose again after this many seconds of data; 0: only on request", "s", ge=0.0, le=1e9)
     tolerance: float = knob(0.001, "part of the signal that is treated as noise; real machines need 0.01 or more", "", ge=1e-6, le=0.5)
-    reorder: float = knob(0.5, "how late a block may come before its samples count as lost", "s", gt=0.0, le=60.0)
-    source: Literal["blocks", "joint_state"] = knob("blocks", "type of the position topic")
-    output: Literal["position", "velocity"] = knob(
-        "position", "with joint_state: the field that is the output; a velocity, of drives whose position is empty, NaN or wraps, is integrated"
-    )
-    effort_as_voltage: bool = knob(False, "with joint_state: take the input from `effort` instead of the voltage topic")
-    joints: Names = knob(
-        [""], 'with joint_state: the joint of an axis, as "x=shoulder_pan_joint"; an axis without an entry has the name of its joint'
-    )
-    joint_topic: str = knob("joint_states", "with joint_state: their topic; that of ros2_control is /joint_states")
-    effort_lag: int = knob(
-        0, "samples by which effort in joint states is older than its stamp; 1 if it is that of the previous cycle", "", ge=0, le=100
-    )
-    input_unit: str = knob("V", "unit of the input, for example N m for an effort; shown in every answer")
-    output_unit: str = knob("m", "unit of the position, m or rad, also where the output is a velocity")
     effect_files: Names = knob([""], "Python files with effects of your own; they are executed")
     baseline: str = knob("", "model file of refine --model from commissioning, with which each diagnosis is compared; empty: none")
     baseline_table: str = knob("", "table of xy-sysid fleet, with the spread of the estimates between recordings; empty: 3 % for every parameter")
@@ -295,11 +281,6 @@ class DiagnoserSettings(Settings):
         default_factory=lambda: {"x": [""], "y": [""]},
         description="effects in the model of this axis: setting them adds or removes them and fits again; an empty name: none",
     )
-
-    @property
-    def units(self) -> Units:
-        """Of input and output."""
-        return _units(self.input_unit, self.output_unit, self.output)
 
     def chosen(self, axis: str) -> tuple[str, ...]:
         """The effects that the model of an axis is to have."""

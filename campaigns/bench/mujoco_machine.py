@@ -1,6 +1,6 @@
 """A machine of one joint, simulated by MuJoCo: other equations, other friction and another integrator than those of ``xy_sim``.
 
-Extra ``foreign`` (pip install '.[foreign]'). The motor's torque is in volts: the joint's damping and inertia give speed per volt and pole. Sizes
+Extra ``mujoco`` (pip install '.[mujoco]'). The motor's torque is in volts: the joint's damping and inertia give speed per volt and pole. Sizes
 of effects are in volts, too. The voltage acts after a whole number of samples.
 """
 

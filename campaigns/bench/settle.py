@@ -13,18 +13,22 @@ import math
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from campaigns.bench.settle_pairs import PAIRS, Pair, Rig, carry_out, first_recording, left_limits, limits, machine
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.experiment_design.beliefs import Belief
+from xy_sysid.experiment_design.criteria import FITTED
 from xy_sysid.experiment_design.design import judge
 from xy_sysid.experiment_design.experiment import Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, Choose, NextChoice, Question, Signals, best_design, decide, settle
-from xy_sysid.experiment_design.precision import informations, volume
+from xy_sysid.experiment_design.loop import Budget, Choose, Decision, Ending, NextChoice, Question, Signals, after, best_design, decide
+from xy_sysid.experiment_design.precision import Information, informations
 from xy_sysid.experiment_design.prediction import Setting
 from xy_sysid.experiment_design.proposals import neighbours, proposals
 
@@ -56,6 +60,11 @@ def noise(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> 
     return NextChoice(None)
 
 
+def volume(belief: Belief, found: Sequence[Information], seconds: float) -> float:
+    """Logarithm of the volume of the parameters' confidence region after an experiment (D-optimality), mean over draws."""
+    return float(np.mean([-0.5 * np.linalg.slogdet(belief.precision + FITTED * seconds * item.each_second)[1] for item in found]))
+
+
 def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits) -> NextChoice:
     """The D-optimal experiment for the parameters of all sets together, from the same candidates as ``design``."""
     rate = setting.layout.sampling_rate
@@ -70,6 +79,42 @@ def d_optimal(setting: Setting, beliefs: Sequence[Belief], asked: MachineLimits)
         return NextChoice(None)
     near = [(total(item), -1 - number, item) for number, item in enumerate(neighbours(best[2], asked, rate))]
     return NextChoice(min([best, *near])[2])
+
+
+CarryOut = Callable[[Experiment], Signals | None]  # runs an experiment; None if it was stopped
+
+
+@dataclass(frozen=True)
+class Settled:
+    """ended: reason; steps: decision after the first recordings and after each experiment; recordings: of the experiments; seconds: of motion."""
+
+    ended: Ending
+    steps: tuple[Decision, ...]
+    recordings: tuple[Signals, ...]
+    seconds: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The set that explains all recordings best."""
+        return self.steps[-1].chosen
+
+
+def settle(question: Question, asked: MachineLimits, run: CarryOut, budget: Budget | None = None, choose: Choose = best_design) -> Settled:
+    """Decide and run experiments until one set remains, no experiment helps, or the budget is used up."""
+    budget = budget or Budget()
+    recordings: list[Signals] = []
+    steps: list[Decision] = []
+    spent = 0.0
+    while True:
+        steps.append(decide(question, recordings, asked, choose, steps[-1].standing if steps else None, budget.draws))
+        following = after(steps[-1], budget, len(recordings), spent)
+        if isinstance(following, str):
+            return Settled(following, tuple(steps), tuple(recordings), spent)
+        found = run(following)
+        if found is None:
+            return Settled("stopped", tuple(steps), tuple(recordings), spent)
+        recordings.append(found)
+        spent += following.seconds
 
 
 QUICK = 5  # index of the fastest pair

@@ -2,7 +2,7 @@
 
 Sets: exact, imperfect 0.2 %, imperfect 1 %, imperfect 3 %, clean dirt, outside, hard, two effects, three effects, first order,
 1 % two effects, 10 s, half, 5 um, quarter, tenth, 5 s, multisine, sweep, prbs, 1 kHz, 5 kHz;
-of MuJoCo (extra foreign): foreign axes, foreign axes, closed loop, foreign joints.
+of MuJoCo (extra mujoco): foreign axes, foreign axes, closed loop, foreign joints.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Axes and robot joints of MuJoCo, with hidden effects: other equations, friction, contact and integrators than ``xy_sim``.
 
-Extra ``foreign`` (pip install '.[foreign]'). An axis is a DC motor, V to rad, driven with noise in open loop, or following a random path in closed
+Extra ``mujoco`` (pip install '.[mujoco]'). An axis is a DC motor, V to rad, driven with noise in open loop, or following a random path in closed
 loop. A joint is driven by a current under a position controller, A to rad, along a slow path; its samples are unevenly spaced.
 """
 

@@ -167,7 +167,7 @@ def test_no_permission_is_one_line(tmp_path: Path) -> None:
 def test_a_bag_that_does_not_fit_in_memory_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A day of samples is not loaded at once; a part of it is."""
     bag = a_bag(tmp_path / "bag", both(range(0, 200_000, 200), 200))
-    monkeypatch.setattr("xy_sysid.imports.bag.SHARE", 2e-4)
+    monkeypatch.setattr("xy_sysid.imports.limits.SHARE", 2e-4)
     monkeypatch.setattr("os.sysconf", lambda name: {"SC_PHYS_PAGES": 5_000_000, "SC_PAGE_SIZE": 4096}[name])
     assert "--span" in error_of(bag)
     part = load(bag, start=90.0, stop=91.5)

@@ -99,7 +99,4 @@ def test_every_text_for_a_terminal_is_made_harmless() -> None:
     assert bold == {
         "xy_sysid/__init__.py: print(step.added, step.held_out_error)",  # an example in a docstring
         'xy_sysid/cli/output.py: sys.stdout.write(json.dumps(plain(document), allow_nan=False) + "\\n")',
-        "xy_sysid/files/ros_parameters.py: sys.stdout.write(default_text())",
-        "xy_sysid/files/viewer_layouts.py: sys.stdout.write(made[sys.argv[1]]())",
-        "xy_sysid/fleets/columns_doc.py: sys.stdout.write(document())",
     }

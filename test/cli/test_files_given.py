@@ -323,7 +323,6 @@ ALONE = {
     "cli/record.py": "a bag of our own, just written",
     "files/effects.py": "is_file",
     "files/fmu.py": "what the compiler has just made",
-    "fleets/columns_doc.py": "a page of the documentation",
     "fleets/journal.py": "own_files has looked, and it is opened without following links",
     "imports/arrays.py": "imports/registry.py has looked, as for all of imports",
     "imports/csv.py": "",

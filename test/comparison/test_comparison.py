@@ -11,15 +11,23 @@ import xy_sysid as xy
 from xy_sim.effect_text import with_effects
 from xy_sim.machine import Machine
 from xy_sim.parts import PARTS
-from xy_sysid.comparison.where_it_fails import Comparison, Unseen, by_chance, compare, compare_motion
+from xy_sysid.comparison.where_it_fails import Comparison, Unseen, by_chance, compare_motion, compare_velocity
 from xy_sysid.errors import BadInput
 from xy_sysid.excitation.lockstep import drive
 from xy_sysid.fitting import Structure, identify
 from xy_sysid.fitting.of_recording import estimate, split
 from xy_sysid.front_door.simulated_recording import simulate
 from xy_sysid.greybox.axis_data import prepare
+from xy_sysid.linear.simulate import simulate as motion_of
 from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.samples.block import FloatArray
 from xy_sysid.settings import AxisExcitation, ExcitationSettings, IdentifierSettings
+from xy_sysid.units import Units
+
+
+def compare(tf: TransferFunction, u: FloatArray, y: FloatArray, sampling_rate: float) -> Comparison:
+    """A transfer function against input and output (n,) of a gap-free run. Raises BadInput if it is too short."""
+    return compare_velocity(np.diff(motion_of(tf, sampling_rate, u)) * sampling_rate, u, y, sampling_rate, Units(tf.input_unit, tf.output_unit))
 
 
 @functools.cache

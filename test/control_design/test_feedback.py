@@ -6,11 +6,11 @@ import control
 import numpy as np
 import pytest
 from helpers.known_models import DELAY, axis, known
+from helpers.sampled import simulate_alone
 
 from xy_sysid.control_design.closed_loop import Controller, Encoder, follow_path
 from xy_sysid.control_design.feedback import GAIN_MARGIN, PHASE_MARGIN, Asked, feedback, margins, margins_of
 from xy_sysid.control_design.path import Bounds, s_curve
-from xy_sysid.control_design.sample_step import simulate_alone
 from xy_sysid.control_design.sampled import closed_poles, controller_response, controller_system, noise_to_voltage, sampled
 from xy_sysid.control_design.uncertain import samples
 from xy_sysid.control_design.use import use

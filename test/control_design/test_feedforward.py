@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.known_models import DELAY, GAIN, POLE, axis, known, unknown
+from helpers.sampled import simulate_alone
 from scipy import signal
 
 from xy_sysid.axis.model import STANDARD, Library, simulate
@@ -21,7 +22,7 @@ from xy_sysid.control_design.gains import gains, simple_feedforward
 from xy_sysid.control_design.inverse import _run_of, ahead_of, feedforward, not_undone
 from xy_sysid.control_design.limits import fastest
 from xy_sysid.control_design.path import Bounds, SampledPath, recorded, s_curve
-from xy_sysid.control_design.sample_step import simulate_alone, step_of
+from xy_sysid.control_design.sample_step import step_of
 from xy_sysid.control_design.tables import friction_table, position_tables
 from xy_sysid.control_design.uncertain import samples, undetermined
 from xy_sysid.control_design.use import use

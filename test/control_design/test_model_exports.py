@@ -19,6 +19,7 @@ import pytest
 import scipy.io
 from helpers.cli_tools import cli
 from helpers.known_models import axis, known
+from helpers.sampled import simulate_alone
 from helpers.simulated import recorded
 from scipy import signal
 
@@ -30,7 +31,6 @@ from xy_sysid.control_design.inverse import feedforward
 from xy_sysid.control_design.mjcf import Mjcf, mjcf
 from xy_sysid.control_design.path import Bounds, s_curve
 from xy_sysid.control_design.program import program
-from xy_sysid.control_design.sample_step import simulate_alone
 from xy_sysid.control_design.sdf import sdf
 from xy_sysid.control_design.use import use
 from xy_sysid.effects import Effect, Parameter, law

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.simulated import recorded as recorded_machine
 
-from campaigns.bench.settle import table
+from campaigns.bench.settle import settle, table
 from campaigns.bench.settle_pairs import PAIRS, carry_out, first_recording, left_limits, limits, machine
 from xy_sysid.axis.model import STANDARD
 from xy_sysid.diagnosis.answer import Answer
@@ -21,7 +21,7 @@ from xy_sysid.experiment_design.design import Design, Judged, _timed, best_first
 from xy_sysid.experiment_design.evidence import Power, nats, seconds_needed, settled
 from xy_sysid.experiment_design.experiment import RAMP, Experiment
 from xy_sysid.experiment_design.limits import MachineLimits
-from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, Question, Signals, settle
+from xy_sysid.experiment_design.loop import Budget, Decision, NextChoice, Question, Signals
 from xy_sysid.experiment_design.of_run import next_experiment
 from xy_sysid.experiment_design.precision import Precision, sharpest
 from xy_sysid.experiment_design.prediction import Setting, recorded, seen
@@ -124,8 +124,8 @@ def test_the_best_experiment_is_exact_and_the_hopeless_ones_stay_rough() -> None
 
 def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
     """Zero evidence never settles; ten times the odds do; the needed seconds are those at which 95 % is reached."""
-    one = Power(truth=0, rival=1, rate=1.0, price=0.0)
-    assert Power(0, 1, 0.0, 0.0).probability(60.0) == 0.0
+    one = Power(truth=0, rate=1.0, price=0.0)
+    assert Power(0, 0.0, 0.0).probability(60.0) == 0.0
     assert one.probability(30.0 * ODDS) > 0.999
     needed = seconds_needed([[one]], 1000.0)
     assert settled([[one]], needed) == pytest.approx(0.95, abs=1e-6)
@@ -134,7 +134,7 @@ def test_probability_follows_from_the_evidence_and_needs_seconds() -> None:
 
 def test_the_present_data_count_once_and_not_for_every_second() -> None:
     """Of 12 nats in 4 s the rival loses 8 on the present data; of a longer experiment only the other 4 grow."""
-    one = Power(truth=0, rival=1, rate=1.0, price=0.0, nats=12.0, seen=4.0)
+    one = Power(truth=0, rate=1.0, price=0.0, nats=12.0, seen=4.0)
     assert [one.after(seconds) for seconds in (-1.0, 0.0, 2.0, 4.0, 10.0)] == [0.0, 0.0, 6.0, 12.0, 18.0]
 
 
@@ -162,7 +162,7 @@ def test_base_or_screw_is_asked_of_a_person() -> None:
 
 def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:
     """The stated probability is that of its actual length."""
-    one = Power(truth=0, rival=1, rate=1.0, price=0.0)
+    one = Power(truth=0, rate=1.0, price=0.0)
     needed = seconds_needed([[one]], 1000.0)
     best = Judged(Experiment(AxisExcitation(kind="noise"), 60.0), seconds=needed, probability=1.0, each=((one,),))
     two: Any = (SimpleNamespace(name="drag"), SimpleNamespace(name="lag"))
@@ -179,7 +179,7 @@ def test_an_experiment_that_the_budget_makes_shorter_promises_less() -> None:
 
 def test_an_experiment_that_ends_early_promises_what_its_own_seconds_bring() -> None:
     """If no experiment settles, it ends when more time gains little; the stated probability is that at its end, not for all seconds."""
-    one = Power(truth=0, rival=1, rate=0.01, price=3.0)
+    one = Power(truth=0, rate=0.01, price=3.0)
     whole = 400.0
     item = Judged(Experiment(AxisExcitation(kind="noise")), probability=settled([[one]], whole - RAMP), each=((one,),))
     timed = _timed(item, MachineLimits(voltage=5.0, travel=(-0.1, 0.1), seconds=whole))

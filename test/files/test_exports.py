@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import yaml
 from helpers.fitting_cases import LINES, RATE, held, paper_machine
+from helpers.sampled import discrete
 from scipy.io import loadmat
 
 from xy_sysid.errors import BadInput, MissingExtra
 from xy_sysid.files import linear_models
 from xy_sysid.fitting import Fit, Structure, identify
-from xy_sysid.linear.simulate import discrete
 from xy_sysid.linear.to_others import to_control
 from xy_sysid.linear.transfer_function import TransferFunction
 

@@ -14,7 +14,7 @@ from helpers import ROOT
 from helpers.live_streams import blocks, last, recorded
 from helpers.stories import told
 
-from xy_sysid.files.viewer_layouts import LARGEST_BLOCK, foxglove, plotjuggler
+from campaigns.documents.viewer_layouts import LARGEST_BLOCK, foxglove, plotjuggler
 from xy_sysid.live.diagnosis_messages import LADDER_COLUMNS, diagnosis_status, ladder_message
 from xy_sysid.live.fitter import Update
 from xy_sysid.live.messages import COMPARISON_COLUMNS, comparison_message
@@ -44,7 +44,7 @@ def series() -> frozenset[str]:
 
 
 def test_the_layouts_are_made_by_their_command() -> None:
-    """python -m xy_sysid.files.viewer_layouts plotjuggler > config/plotjuggler.xml, and foxglove > config/foxglove.json"""
+    """python -m campaigns.documents.viewer_layouts plotjuggler > config/plotjuggler.xml, and foxglove > config/foxglove.json"""
     assert (ROOT / "config" / "plotjuggler.xml").read_text(encoding="utf-8") == plotjuggler()
     assert (ROOT / "config" / "foxglove.json").read_text(encoding="utf-8") == foxglove()
 

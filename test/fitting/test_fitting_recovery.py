@@ -10,10 +10,10 @@ import pytest
 from helpers.fitting_cases import function
 from helpers.fitting_cases import held as noisy
 from helpers.fitting_data import RATE, held, lines, measured, paper_machine
+from helpers.sampled import discrete
 
 from xy_sysid.fitting import ESTIMATORS, FitOptions, Structure, identify
 from xy_sysid.fitting.result import Fit
-from xy_sysid.linear.simulate import discrete
 from xy_sysid.linear.transfer_function import TransferFunction
 
 GAUSS_NEWTON = FitOptions(method="gauss_newton")

@@ -19,12 +19,12 @@ from plotly.offline import get_plotlyjs
 
 import xy_sysid as xy
 from campaigns.bench.trend import FRICTION, PARAMETERS, axis, delays, limits, until
+from campaigns.documents.fleet_columns import document
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.fleets import presence
 from xy_sysid.fleets.alike import learned
 from xy_sysid.fleets.causes import causes
 from xy_sysid.fleets.change import changes, evidence, statistic
-from xy_sysid.fleets.columns_doc import document
 from xy_sysid.fleets.history import Axis
 from xy_sysid.fleets.row import Row
 from xy_sysid.fleets.table import merged
@@ -268,7 +268,7 @@ def test_a_year_of_twenty_machines_names_the_three_that_go_bad_and_their_causes(
 
 
 def test_the_page_of_the_fleet_lists_every_column() -> None:
-    """python -m xy_sysid.fleets.columns_doc --write"""
+    """python -m campaigns.documents.fleet_columns --write"""
     assert document() in (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")
 
 

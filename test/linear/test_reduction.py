@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.fitting_data import RATE, lines, paper_machine
+from helpers.sampled import discrete
 
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.reduction import balanced_truncation, minreal
-from xy_sysid.linear.simulate import discrete
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.samples.block import FloatArray
 

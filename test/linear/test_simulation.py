@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import scipy.integrate
 from helpers.fitting_data import RATE, lines, paper_machine
+from helpers.sampled import discrete
 
 from xy_sysid.errors import BadInput
-from xy_sysid.linear.simulate import discrete, held_response, simulate, simulation_error, state_space
+from xy_sysid.linear.simulate import held_response, simulate, simulation_error, state_space
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.samples.block import FloatArray
 

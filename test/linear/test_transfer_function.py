@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.fitting_data import RATE, lines, paper_machine
+from helpers.sampled import discrete
 
 from xy_sysid.errors import BadInput
-from xy_sysid.linear.simulate import discrete, held_response
+from xy_sysid.linear.simulate import held_response
 from xy_sysid.linear.transfer_function import TransferFunction
 
 

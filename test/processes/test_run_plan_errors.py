@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 from helpers import ROOT
 
+from campaigns.documents.ros_parameters import default_text
 from xy_sysid.errors import BadInput
 from xy_sysid.files.package_files import find, share
-from xy_sysid.files.ros_parameters import NODES, WITH_AXES, checked, default_text, parameters
+from xy_sysid.files.ros_parameters import NODES, WITH_AXES, checked, parameters
 from xy_sysid.processes import starter
 from xy_sysid.processes.run_plan import plan
 from xy_sysid.settings import knobs
@@ -106,7 +107,7 @@ def test_a_section_for_all_nodes_reaches_those_that_know_the_name() -> None:
 def test_the_default_file_is_what_the_settings_say() -> None:
     """config/default.yaml contains exactly all settings of every node at their defaults."""
     text = (HERE / "config" / "default.yaml").read_text(encoding="utf-8")
-    assert text == default_text(), "run: python -m xy_sysid.files.ros_parameters > config/default.yaml"
+    assert text == default_text(), "run: python -m campaigns.documents.ros_parameters > config/default.yaml"
     assert parameters(text, "default.yaml") == {
         node: {knob.name: knob.value for knob in knobs(cls())} | ({"axes": ["x", "y"]} if node in WITH_AXES else {}) for node, cls in NODES.items()
     }

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.axis.model import AxisModel
+from xy_sysid.axis.resonant_loop import FINE
 from xy_sysid.effects import Effect
 from xy_sysid.effects._contract import arguments
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.units import USUAL, Units
 
-FINE = 1e5  # Hz at which the roots of a section are computed: far above any resonance, where s = ln(z) fs is accurate enough
 ROUNDING = 1e-3  # relative to a pole, above its imaginary part by rounding: a double root at 1 Hz has 2.5e-4
 STEP = 1e-5  # s, step for the test of a lag
 

@@ -32,7 +32,7 @@ def text(name: str, effects: Sequence[Effect]) -> str:
     fs: Hz; fine: Hz, sub-steps of laws that depend on speed; start: speed at the first sample, m/s;
     out: (n,) receives the mean velocity of each sample, m/s.
     """
-    return _loop(name, effects, {"more": "", "begins": "", "ends": "", "places": _places(effects), "inputs": _inputs(effects)}, _encoders(effects))
+    return _loop(name, effects, {"more": "", "begins": "", "ends": "", "places": _places(effects), "inputs": _inputs(effects)}, _encoders())
 
 
 def moving(name: str, effects: Sequence[Effect]) -> str:
@@ -355,7 +355,7 @@ def _places(effects: Sequence[Effect]) -> str:
     return _lines(1, [*lines, "            x[i] = shown[i] - wrong"])
 
 
-def _encoders(effects: Sequence[Effect]) -> str:
+def _encoders() -> str:
     return _lines(1, ["if encoded:", "    for i in range(n):", "        out[i] += ((shown[i + 1] - x[i + 1]) - (shown[i] - x[i])) * fs"])
 
 

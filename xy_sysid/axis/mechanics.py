@@ -16,7 +16,6 @@ from xy_sysid.effects import SIMPLEST_FRICTION
 from xy_sysid.errors import BadInput
 from xy_sysid.units import SCALES, Units
 
-TURN = 2.0 * math.pi
 FRICTION = f"{SIMPLEST_FRICTION.name}.{SIMPLEST_FRICTION.names[0]}"
 ROBOTS = {"inertia": "armature", "damping": "damping", FRICTION: "frictionloss", "friction": "frictionloss"}  # MuJoCo, URDF
 
@@ -86,7 +85,7 @@ def drive_from(kt: float | None, gear: str, units: Units) -> Transmission:
     if not 0.0 < value < 1e9 or (unit and length[0] != "m") or linear != bool(unit):
         allowed = "the way of one turn with its unit, such as 5mm" if linear else "turns of the motor for one of the output, such as 50"
         raise BadInput("--gear", gear, allowed, "Change it.")
-    return Transmission(kt, TURN / (value * length[1]) if unit else value)
+    return Transmission(kt, math.tau / (value * length[1]) if unit else value)
 
 
 def mechanics(figures: Iterable[Figure], units: Units, drive: Transmission) -> tuple[Mechanical, ...]:

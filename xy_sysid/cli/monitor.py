@@ -6,38 +6,31 @@ import os
 import time
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float64MultiArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.live.plain_messages import ArrayMessage, topic_of
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE
 from xy_sysid.nodes.convert import array_from_ros
+from xy_sysid.nodes.own_context import OwnContext
 from xy_sysid.nodes.wall import Wall
 
 LISTENERS = 3  # subscribers of voltage: machine, identifier, diagnoser; of position: excitation, identifier, diagnoser
 QUIET = 1.0  # s without a new result after which the last one has arrived
 
 
-class Monitor:
+class Monitor(OwnContext):
     """A node that receives results and statuses; call ``spin`` often."""
 
     def __init__(self, axes: tuple[str, ...], listeners: int = LISTENERS) -> None:
+        super().__init__("demo", NAMESPACE)
         self._listeners = listeners
         self.arrays: dict[str, ArrayMessage] = {}
         self.statuses: dict[str, tuple[int, str, dict[str, str]]] = {}
         self.changed = time.monotonic()
-        self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node("demo", namespace=NAMESPACE, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
         self._wall = Wall(lambda words: self._node.get_logger().error(words))
         for axis in axes:
             for kind in ("frf", "transfer_function", "comparison"):
@@ -103,11 +96,6 @@ class Monitor:
         """True if the excitation has ended and the last results have arrived."""
         state = self.statuses.get("excitation", (0, "", {}))[2].get("state", "")
         return state == "stopped" and time.monotonic() - self.changed > QUIET
-
-    def close(self) -> None:
-        """Remove the node from the graph."""
-        self._node.destroy_node()
-        self._context.try_shutdown()
 
 
 def refuse_others(monitor: Monitor) -> None:

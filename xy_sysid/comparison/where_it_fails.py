@@ -18,10 +18,8 @@ import numpy as np
 import scipy
 
 from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import EPSILON
 from xy_sysid.greybox.floor import Floor, Windows, bands, encoder_noise, floor
-from xy_sysid.greybox.free_run import EPSILON
-from xy_sysid.linear.simulate import simulate
-from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units, motion, moved, told
 
@@ -127,11 +125,6 @@ class Unseen:
     def skipped(self) -> int:
         """Number of samples at the start that do not count."""
         return min(int(SKIP * self.sampling_rate), self.position.shape[0] // 5) if self.held is None else 0
-
-
-def compare(tf: TransferFunction, u: FloatArray, y: FloatArray, sampling_rate: float) -> Comparison:
-    """A transfer function against input and output (n,) of a gap-free run. Raises BadInput if it is too short."""
-    return compare_velocity(np.diff(simulate(tf, sampling_rate, u)) * sampling_rate, u, y, sampling_rate, Units(tf.input_unit, tf.output_unit))
 
 
 def compare_velocity(model: FloatArray, u: FloatArray, y: FloatArray, sampling_rate: float, units: Units = USUAL, begins: float = 0.0) -> Comparison:

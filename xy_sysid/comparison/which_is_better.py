@@ -12,14 +12,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from xy_sysid.comparison.where_it_fails import SKIP
 from xy_sysid.errors import BadInput
+from xy_sysid.greybox.axis_data import EPSILON
 from xy_sysid.greybox.floor import Windows, bands, encoder_noise, floor
-from xy_sysid.greybox.free_run import EPSILON
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units, bare, moved
 
 ABOVE = 1.2  # least power of one of the two errors, relative to the floor, for a change to matter
-SKIP = 0.5  # s at the start until initial conditions of the simulation have decayed
 WANTED, FEWEST = 10, 5  # adjacent windows: wanted number, least number
 LEVEL = 0.05  # probability of a false "better" or "worse"
 WORTH = 0.02  # relative change of the error that is negligible

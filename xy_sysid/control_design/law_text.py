@@ -10,7 +10,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import Effect
 from xy_sysid.effects._binding import call
 
-X, V, Q = 0, 1, 2  # indices in a state: position, speed, attached masses
+Q = 2  # index in a state of the attached masses, after position and speed
 NUMBERS = ("gain", "pole", "turn", "h_old", "h_new", "cuts_old", "cuts_new", "back_old", "back_new", "n", "ring", "shake")
 WHOLE_NUMBERS = frozenset({"cuts_old", "cuts_new", "back_old", "back_new", "n", "ring"})
 

@@ -15,7 +15,7 @@ from xy_sysid.axis import interpolation, resonant_loop
 from xy_sysid.axis.model import FINE, STANDARD, AxisModel, Library
 from xy_sysid.control_design import series
 from xy_sysid.control_design.law_text import NUMBERS, StateLayout
-from xy_sysid.control_design.step_text import ROOM, StepText, heeds
+from xy_sysid.control_design.step_text import StepText, heeds
 from xy_sysid.effects import Effect
 from xy_sysid.effects._binding import law_names, law_texts
 from xy_sysid.effects._contract import arguments
@@ -146,17 +146,6 @@ def step_of(library: Library) -> Callable[..., float]:
     return compiled_text(lambda name: writer.text(name), names, parts)
 
 
-def simulate_alone(model: AxisModel, sampling_rate: float, voltage: FloatArray) -> FloatArray:
-    """(n,) encoder position, m, for a voltage (n,), V, from rest at position 0; there is no feedback."""
-    ready = plant(model, sampling_rate)
-    step, state, room = step_of(model.library.looped([model.library[name] for name, _ in model.effects])), ready.rest(), np.zeros(ROOM * ready.order)
-    begin(ready, state, 0.0)
-    shown = np.zeros(voltage.size)
-    for k, volts in enumerate(voltage[:-1].tolist()):
-        shown[k + 1] = step(volts, ready.parameters, ready.flags, ready.numbers, ready.moving, ready.still, state, room)
-    return shown
-
-
 def begin(ready: Plant, state: FloatArray, speed: float, position: float = 0.0) -> None:
     """Set the state to this speed and position; the attached masses have the same speed."""
     top, _ = sections(ready.model, ready.sampling_rate)
@@ -165,4 +154,4 @@ def begin(ready: Plant, state: FloatArray, speed: float, position: float = 0.0) 
         state[2] = speed / top[0]
 
 
-__all__ = ["STANDARD", "Plant", "begin", "plant", "simulate_alone", "step_of"]
+__all__ = ["STANDARD", "Plant", "begin", "plant", "step_of"]

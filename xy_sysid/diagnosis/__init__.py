@@ -3,6 +3,7 @@
 answer:     the result: the steps (rungs), the other sets that were tried, the verdict
 sets:       which laws a set of effects has, and how much it explains
 equal_laws: effects with equal equations: the more probable one, and its probability
+unmodelled: the force that no effect explains
 rungs:      from the fits of a search to its answer
 refine:     search, simpler sets, one-step prediction
 first_set:  a known set of effects is tried first; if it explains the data, no search is needed

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import scipy
@@ -43,10 +43,16 @@ def pair(zero: float, zero_damping: float, pole: float, pole_damping: float, fs:
     return b0, b0 * b1, b0 * b2, a1, a2
 
 
+@law
+def section(split: float, frequency: float, damping: float, pole_damping: float, fs: float) -> tuple[float, float, float, float, float]:
+    """The pair of an effect: its resonance is ``split`` above its antiresonance ``frequency`` (Hz)."""
+    return pair(frequency, damping, frequency * (1.0 + split), pole_damping, fs)
+
+
 def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
     """The most likely pairs with poles between ``low`` and ``high`` (Hz)."""
     for trace, frequency in traces(scene, low, high):
-        yield Guess(trace, _Reader(frequency))
+        yield Guess(trace, partial(_read, frequency))
 
 
 def traces(scene: Scene, low: float, high: float) -> Iterator[tuple[FloatArray, float]]:
@@ -91,17 +97,12 @@ def _error_spectra(scene: Scene) -> tuple[FloatArray, FloatArray, NDArray[np.com
     return f[used], power[used], cross[used], (1.0 / np.where(used, own * f, 1.0))[used]
 
 
-class _Reader:
+def _read(frequency: float, c: FloatArray) -> tuple[float, ...]:
     """(antiresonance, its damping, split, damping of the resonance) from the two coefficients of a pole at ``frequency``."""
-
-    def __init__(self, frequency: float) -> None:
-        self.frequency = frequency
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        stretch = max(1.0 + float(c[0]), 1.02)
-        zero = self.frequency / math.sqrt(stretch)
-        damping = (2.0 * _DAMPING + float(c[1])) / (2.0 * math.sqrt(stretch))
-        return (self.frequency / zero - 1.0, zero, min(max(damping, 0.005), 0.2), _DAMPING)
+    stretch = max(1.0 + float(c[0]), 1.02)
+    zero = frequency / math.sqrt(stretch)
+    damping = (2.0 * _DAMPING + float(c[1])) / (2.0 * math.sqrt(stretch))
+    return (frequency / zero - 1.0, zero, min(max(damping, 0.005), 0.2), _DAMPING)
 
 
 def joint(scene: Scene, low: float, high: float) -> Iterator[tuple[float, float, float, tuple[float, ...]]]:

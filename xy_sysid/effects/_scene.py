@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -159,3 +160,8 @@ class Guess:
 def columns(*signals: FloatArray) -> FloatArray:
     """(k, n) from k signals of n samples."""
     return np.vstack(signals)
+
+
+def wave(period: float, c: FloatArray) -> tuple[float, float, float]:
+    """(amplitude, period, phase) from the coefficients of sine and cosine."""
+    return (math.hypot(float(c[0]), float(c[1])), period, math.atan2(float(c[1]), float(c[0])))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import scipy
@@ -26,7 +27,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     for lag in np.geomspace(0.2e-3, 5e-3, 6) * scene.similar.time:
         left = math.exp(-1.0 / (float(lag) * scene.sampling_rate))
         behind = scipy.signal.lfilter([1.0 - left], [1.0, -left], scene.voltage)
-        yield Guess(columns(scene.voltage - behind), _Reader(float(lag)), whole=True)
+        yield Guess(columns(scene.voltage - behind), partial(_read, float(lag)), whole=True)
 
 
 def joint(scene: Scene) -> Iterator[tuple[float, float, float, tuple[float, ...]]]:
@@ -35,14 +36,9 @@ def joint(scene: Scene) -> Iterator[tuple[float, float, float, tuple[float, ...]
         yield scene.gain, -float(lag), scene.pole, (float(lag),)
 
 
-class _Reader:
+def _read(lag: float, c: FloatArray) -> tuple[float, ...]:
     """The lag from the coefficient of a tested lag."""
-
-    def __init__(self, lag: float) -> None:
-        self.lag = lag
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (self.lag * min(max(float(c[0]), 0.3), 3.0),)
+    return (lag * min(max(float(c[0]), 0.3), 3.0),)
 
 
 EFFECT = Effect(

@@ -6,17 +6,11 @@ import math
 from collections.abc import Iterable
 
 from xy_sysid.effects import _pole_zero_pair
-from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._contract import Effect, Parameter
 from xy_sysid.effects._scene import Guess, Scene
 
 LOWEST, HIGHEST = 1.0, 90.0  # Hz, range of the tested frequencies
 SLOW = 0.25  # lowest tested frequency of a slow axis, relative to the corner frequency of its base
-
-
-@law
-def section(split: float, frequency: float, damping: float, pole_damping: float, fs: float) -> tuple[float, float, float, float, float]:
-    """The pole-zero pair."""
-    return _pole_zero_pair.pair(frequency, damping, frequency * (1.0 + split), pole_damping, fs)
 
 
 def guesses(scene: Scene) -> Iterable[Guess]:
@@ -50,7 +44,7 @@ EFFECT = Effect(
     shows="antiresonance and a resonance near it, mostly below 90 Hz; same equations as screw_compliance: typical values decide which is more likely",
     look_alikes=("screw_compliance",),
     experiment="a scale on the table, an accelerometer on the base, or another payload",
-    functions={"section": section},
+    functions={"section": _pole_zero_pair.section},
     guesses=guesses,
     joint=joint,
     family="resonance",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from xy_sysid.effects._contract import Effect, Parameter, law
-from xy_sysid.effects._scene import Guess, Scene, columns
-from xy_sysid.samples.block import FloatArray
+from xy_sysid.effects._scene import Guess, Scene, columns, wave
 
 PARTS = (0.5, 0.75, 1.1, 1.6)  # periods within the travel, of waves too long to repeat there
 LEAST = 0.5  # least periods within the travel: with less, a wave is a softening spring
@@ -34,23 +34,13 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 def _wave(scene: Scene, period: float, inverse_only: bool = False) -> Guess:
     angle = 2.0 * math.pi * scene.position / period
-    return Guess(columns(np.sin(angle), np.cos(angle)), _Reader(period), inverse_only)
+    return Guess(columns(np.sin(angle), np.cos(angle)), partial(wave, period), inverse_only)
 
 
 def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
     """Rejects a wave with less than ``LEAST`` periods within the travel."""
     seen = (between[1] - between[0]) / values[1]
     return f"only {seen:.2g} of its period are within the travel, at least {LEAST:g} are needed" if seen < LEAST else ""
-
-
-class _Reader:
-    """(amplitude, period, phase) from the coefficients of sine and cosine."""
-
-    def __init__(self, period: float) -> None:
-        self.period = period
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (math.hypot(float(c[0]), float(c[1])), self.period, math.atan2(float(c[1]), float(c[0])))
 
 
 EFFECT = Effect(

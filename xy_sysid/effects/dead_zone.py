@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -21,17 +22,12 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     """The voltage clipped to the zone, for half widths of 3 to 100 % of its standard deviation."""
     u = scene.voltage
     for width in np.geomspace(0.03, 1.0, 8) * float(np.std(u)):
-        yield Guess(columns(np.clip(u, -width, width)), _Reader(float(width)), whole=True)
+        yield Guess(columns(np.clip(u, -width, width)), partial(_read, float(width)), whole=True)
 
 
-class _Reader:
+def _read(width: float, c: FloatArray) -> tuple[float, ...]:
     """The width from the coefficient of a tested width, to which it is proportional to first order."""
-
-    def __init__(self, width: float) -> None:
-        self.width = width
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (self.width * max(float(c[0]), 0.1),)
+    return (width * max(float(c[0]), 0.1),)
 
 
 EFFECT = Effect(

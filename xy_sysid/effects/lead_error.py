@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from xy_sysid.effects._contract import Effect, Parameter, law
-from xy_sysid.effects._scene import Guess, Scene, columns
-from xy_sysid.samples.block import FloatArray
+from xy_sysid.effects._scene import Guess, Scene, columns, wave
 
 
 @law
@@ -25,17 +25,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     for period in scene.periods(e * v, v * v):
         angle = 2.0 * math.pi * scene.position / period
         rate = 2.0 * math.pi / period * v
-        yield Guess(columns(rate * np.cos(angle), -rate * np.sin(angle)), _Reader(period))
-
-
-class _Reader:
-    """(amplitude, period, phase) from the coefficients of sine and cosine."""
-
-    def __init__(self, period: float) -> None:
-        self.period = period
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (math.hypot(float(c[0]), float(c[1])), self.period, math.atan2(float(c[1]), float(c[0])))
+        yield Guess(columns(rate * np.cos(angle), -rate * np.sin(angle)), partial(wave, period))
 
 
 def refusal(values: Sequence[float], between: tuple[float, float]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from functools import partial
 
 from xy_sysid.effects import _pole_zero_pair
 from xy_sysid.effects._contract import Effect, Parameter, law
@@ -27,17 +28,12 @@ def section(frequency: float, damping: float, fs: float) -> tuple[float, float, 
 def guesses(scene: Scene) -> Iterator[Guess]:
     """The traces of a pole-zero pair; the two coefficients are read differently."""
     for trace, frequency in _pole_zero_pair.traces(scene, LOWEST, HIGHEST):
-        yield Guess(trace, _Reader(frequency))
+        yield Guess(trace, partial(_read, frequency))
 
 
-class _Reader:
+def _read(frequency: float, c: FloatArray) -> tuple[float, ...]:
     """(frequency, damping) from the two coefficients of poles at ``frequency``."""
-
-    def __init__(self, frequency: float) -> None:
-        self.frequency = frequency
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (self.frequency, min(max(-0.5 * float(c[1]), 0.005), 0.5))
+    return (frequency, min(max(-0.5 * float(c[1]), 0.005), 0.5))
 
 
 def joint(scene: Scene) -> Iterable[tuple[float, float, float, tuple[float, ...]]]:

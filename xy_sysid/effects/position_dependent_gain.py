@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
 from xy_sysid.effects._contract import Effect, Parameter, law
-from xy_sysid.effects._scene import Guess, Scene, columns
+from xy_sysid.effects._scene import Guess, Scene, columns, wave
 from xy_sysid.samples.block import FloatArray
 
 
@@ -24,18 +25,13 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     base = 2.0 * scene.velocity / scene.gain - scene.voltage
     for period in scene.periods(scene.missing_force() * base, base * base):
         angle = 2.0 * math.pi * scene.position / period
-        yield Guess(columns(np.sin(angle) * base, np.cos(angle) * base), _Reader(period))
+        yield Guess(columns(np.sin(angle) * base, np.cos(angle) * base), partial(_read, period))
 
 
-class _Reader:
+def _read(period: float, c: FloatArray) -> tuple[float, ...]:
     """(depth, period, phase) from the coefficients of sine and cosine."""
-
-    def __init__(self, period: float) -> None:
-        self.period = period
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        depth = min(max(math.hypot(float(c[0]), float(c[1])), 1e-3), 0.8)
-        return (depth, self.period, math.atan2(float(c[1]), float(c[0])))
+    depth, _, phase = wave(period, c)
+    return (min(max(depth, 1e-3), 0.8), period, phase)
 
 
 EFFECT = Effect(

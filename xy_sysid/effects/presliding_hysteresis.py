@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -40,17 +41,12 @@ def guesses(scene: Scene) -> Iterator[Guess]:
         return
     damping = DAMPING * float(np.std(scene.voltage)) / usual
     for length in LENGTHS:
-        yield Guess(columns(_deflection(v, 1.0 / scene.sampling_rate, length * swing)), _Reader(length * swing, damping))
+        yield Guess(columns(_deflection(v, 1.0 / scene.sampling_rate, length * swing)), partial(_read, length * swing, damping))
 
 
-class _Reader:
+def _read(length: float, damping: float, c: FloatArray) -> tuple[float, ...]:
     """(coulomb, length, damping) from the coefficient at one length."""
-
-    def __init__(self, length: float, damping: float) -> None:
-        self.length, self.damping = length, damping
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (float(c[0]), self.length, self.damping)
+    return (float(c[0]), length, damping)
 
 
 @compiled

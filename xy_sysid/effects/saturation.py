@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -22,17 +23,12 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     u = scene.voltage
     for limit in np.quantile(np.abs(u), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.92, 0.96, 0.98, 0.99, 0.997, 0.999]):
         above = u - np.clip(u, -limit, limit)
-        yield Guess(columns(above), _Reader(float(limit)), whole=True)
+        yield Guess(columns(above), partial(_read, float(limit)), whole=True)
 
 
-class _Reader:
+def _read(limit: float, _: FloatArray) -> tuple[float, ...]:
     """The tested limit."""
-
-    def __init__(self, limit: float) -> None:
-        self.limit = limit
-
-    def __call__(self, _: FloatArray) -> tuple[float, ...]:
-        return (self.limit,)
+    return (limit,)
 
 
 EFFECT = Effect(

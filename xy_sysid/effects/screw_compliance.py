@@ -5,14 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from xy_sysid.effects import _pole_zero_pair
-from xy_sysid.effects._contract import Effect, Parameter, law
+from xy_sysid.effects._contract import Effect, Parameter
 from xy_sysid.effects._scene import Guess, Scene
-
-
-@law
-def section(split: float, frequency: float, damping: float, pole_damping: float, fs: float) -> tuple[float, float, float, float, float]:
-    """The pole-zero pair."""
-    return _pole_zero_pair.pair(frequency, damping, frequency * (1.0 + split), pole_damping, fs)
 
 
 def guesses(scene: Scene) -> Iterable[Guess]:
@@ -42,7 +36,7 @@ EFFECT = Effect(
     "typical values decide which is more likely",
     look_alikes=("base_resonance",),
     experiment="a scale on the table, an accelerometer on the base, or another payload",
-    functions={"section": section},
+    functions={"section": _pole_zero_pair.section},
     guesses=guesses,
     joint=joint,
     family="resonance",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -28,17 +29,12 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     usual = float(np.std(v))
     for velocity in np.concatenate((np.geomspace(0.02, 1.0, 8), np.geomspace(1.7, 5.0, 3))) * usual:
         near = direction * np.exp(-((v / velocity) ** 2))
-        yield Guess(columns(near, direction), _Reader(float(velocity)), inverse_only=bool(velocity > usual))
+        yield Guess(columns(near, direction), partial(_read, float(velocity)), inverse_only=bool(velocity > usual))
 
 
-class _Reader:
+def _read(velocity: float, c: FloatArray) -> tuple[float, ...]:
     """(coulomb, excess, velocity) from the coefficients at one Stribeck speed."""
-
-    def __init__(self, velocity: float) -> None:
-        self.velocity = velocity
-
-    def __call__(self, c: FloatArray) -> tuple[float, ...]:
-        return (float(c[1]), float(c[0]), self.velocity)
+    return (float(c[1]), float(c[0]), velocity)
 
 
 EFFECT = Effect(

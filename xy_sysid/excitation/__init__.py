@@ -7,7 +7,10 @@
     drive:                                         from a signal to the applied voltage: ramps, centring, limits
     trajectory, motion_plan, trajectory_drive:     a motion within limits of position, speed and acceleration, in pieces that end at rest
     motion_check, sign_check, following:           whether the motion of each axis fits its voltage or reference
+    encoder_noise:                                 smaller changes of the encoder are no motion
     travel_limits:                                 keeps axes away from the ends of travel
+    stop_latch:                                    who has requested STOP
+    first_run:                                     the first motion of an unknown machine
     designed:                                      an experiment from a file, within the machine's own limits
     pacing:                                        when the next block is due
     lockstep:                                      a machine driven without a clock: recordings for tests and simulations

@@ -37,6 +37,6 @@ def step(settings: AxisExcitation, rate: float) -> Parts:
     return Parts.of(_runs([(0.0, period), (settings.rms, period), (0.0, period), (-settings.rms, period)]))
 
 
-def off(settings: AxisExcitation, rate: float) -> Parts:
+def off(_settings: AxisExcitation, _rate: float) -> Parts:
     """0 V without end: this axis is only held."""
     return Parts.of(_runs([(0.0, PIECE)]))

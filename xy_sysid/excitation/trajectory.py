@@ -94,7 +94,7 @@ def _multisine(time: FloatArray, band: tuple[float, float], seconds: float, seed
     return (turn @ size).real, (turn @ (1j * omega * size)).real, (turn @ (-(omega**2) * size)).real
 
 
-def _sweep(time: FloatArray, band: tuple[float, float], seconds: float, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _sweep(time: FloatArray, band: tuple[float, float], seconds: float, _seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A sine whose frequency rises exponentially, of constant amplitude in speed, and its two derivatives."""
     growth = np.log(band[1] / band[0]) / seconds
     omega = 2.0 * np.pi * band[0] * np.exp(growth * time)

@@ -33,7 +33,6 @@ class Power:
     """
 
     truth: int
-    rival: int
     rate: float
     price: float
     nats: float = 0.0
@@ -66,7 +65,7 @@ def powers(beliefs: Sequence[Belief], truth: int, model: AxisModel, item: Record
         whole, lost = nats((own, rival), model, item, rounds)
         rate = max(whole - lost, 0.0) / item.seconds
         price = PRICE * max(own.free - rival.free, 0)
-        found.append(Power(truth=truth, rival=number, rate=rate, price=price, nats=whole, seen=item.seconds))
+        found.append(Power(truth=truth, rate=rate, price=price, nats=whole, seen=item.seconds))
     return found
 
 

@@ -1,6 +1,6 @@
-"""Design, run and compare, repeated until one set of effects remains.
+"""One step of the way to one set of effects: compare the sets on all recordings, and design the next experiment.
 
-A pure function of the experiments' recordings: the same recordings give the same decisions.
+Pure functions of the recordings: the same recordings give the same decisions.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from xy_sysid.units import USUAL, Units
 
 Ending = Literal["settled", "alike", "impossible", "experiments", "seconds", "stopped"]
 Signals = tuple[FloatArray, FloatArray]  # voltage and position, (n,) each
-CarryOut = Callable[[Experiment], Signals | None]  # runs an experiment; None if it was stopped
 
 
 @dataclass(frozen=True)
@@ -76,21 +75,6 @@ class Decision:
 
 
 @dataclass(frozen=True)
-class Settled:
-    """ended: reason; steps: decision after the first recordings and after each experiment; recordings: of the experiments; seconds: of motion."""
-
-    ended: Ending
-    steps: tuple[Decision, ...]
-    recordings: tuple[Signals, ...]
-    seconds: float
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """The set that explains all recordings best."""
-        return self.steps[-1].chosen
-
-
-@dataclass(frozen=True)
 class Question:
     """sampling_rate: Hz; recordings: the existing ones; sets: of effects to distinguish; tolerance: part of the motion that models may miss."""
 
@@ -118,24 +102,6 @@ def decide(
     beliefs = beliefs_of(data, question.library, now, limits.travel, draws)
     choice = choose(Setting.of(data), beliefs, limits) if len(beliefs) > 1 else None
     return Decision(now, tuple(item.effects for item in beliefs), choice)
-
-
-def settle(question: Question, limits: MachineLimits, run: CarryOut, budget: Budget | None = None, choose: Choose = best_design) -> Settled:
-    """Decide and run experiments until one set remains, no experiment helps, or the budget is used up."""
-    budget = budget or Budget()
-    recordings: list[Signals] = []
-    steps: list[Decision] = []
-    spent = 0.0
-    while True:
-        steps.append(decide(question, recordings, limits, choose, steps[-1].standing if steps else None, budget.draws))
-        following = after(steps[-1], budget, len(recordings), spent)
-        if isinstance(following, str):
-            return Settled(following, tuple(steps), tuple(recordings), spent)
-        found = run(following)
-        if found is None:
-            return Settled("stopped", tuple(steps), tuple(recordings), spent)
-        recordings.append(found)
-        spent += following.seconds
 
 
 def after(last: Decision, budget: Budget, experiments: int, seconds: float) -> Experiment | Ending:

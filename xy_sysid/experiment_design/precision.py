@@ -173,11 +173,6 @@ def _width(belief: Belief, found: Sequence[Information], target: Precision, seco
     return float(np.mean([target.half_width(belief, item.covariance(belief.precision, seconds)) for item in found]))
 
 
-def volume(belief: Belief, found: Sequence[Information], seconds: float) -> float:
-    """Logarithm of the volume of the parameters' confidence region after an experiment (D-optimality), mean over draws."""
-    return float(np.mean([-0.5 * np.linalg.slogdet(belief.precision + FITTED * seconds * item.each_second)[1] for item in found]))
-
-
 def _inverse(matrix: FloatArray) -> FloatArray:
     unit = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     return np.asarray(np.linalg.pinv(matrix / np.outer(unit, unit), rcond=1e-13, hermitian=True) / np.outer(unit, unit))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -61,8 +62,7 @@ def _axis(fit: Fit) -> dict[str, Any]:
 
 def write_model(path: Path, fits: dict[str, Fit], provenance: dict[str, Any]) -> None:
     """Write the models as YAML; axis names are quoted, as a bare y would mean true."""
-    text = yaml.dump(model_document(fits, provenance), Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)
-    write_text(path, sealed(text))
+    write_text(path, sealed_yaml(model_document(fits, provenance)))
 
 
 class Quoting(yaml.SafeDumper):
@@ -75,6 +75,11 @@ def _string(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 
 Quoting.add_representer(str, _string)
+
+
+def sealed_yaml(document: Mapping[str, Any]) -> str:
+    """The text of a model file."""
+    return sealed(str(yaml.dump(document, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,14 +156,19 @@ def _transfer_function(path: Path, axis: str, part: Any) -> TransferFunction:
     return TransferFunction(numerator / denominator[0], denominator / denominator[0], delay, step, input_unit=units[0], output_unit=units[1])
 
 
+def mat_name(axis: str) -> str:
+    """The name of an axis as a name in MATLAB."""
+    name = "".join(c if c.isalnum() else "_" for c in axis)
+    return name if name[:1].isalpha() else f"axis_{name}"
+
+
 def write_mat(path: Path, fits: dict[str, Fit]) -> None:
     """A MATLAB file: for each axis <axis>_num, <axis>_den, <axis>_delay, so that tf(x_num, x_den, 'InputDelay', x_delay) works."""
     from scipy.io import savemat
 
     content: dict[str, Any] = {}
     for axis, fit in fits.items():
-        name = "".join(c if c.isalnum() else "_" for c in axis)
-        name = name if name[:1].isalpha() else f"axis_{name}"
+        name = mat_name(axis)
         content |= {f"{name}_num": fit.tf.numerator, f"{name}_den": fit.tf.denominator, f"{name}_delay": fit.tf.delay}
         content |= {f"{name}_Ts": fit.tf.sampling_time or 0.0, f"{name}_freq_hz": fit.frequency, f"{name}_frf": fit.measured}
         content[f"{name}_units"] = over(fit.tf.output_unit, fit.tf.input_unit)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from xy_sysid.axis.linear_part import linear_part, nonlinear
 from xy_sysid.axis.model import STANDARD, AxisModel, Library
@@ -16,8 +15,7 @@ from xy_sysid.bags.atomic import whole, write_text
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.diagnosis.as_json import parameters
 from xy_sysid.errors import BadInput, BadRecording
-from xy_sysid.files.linear_models import FORMAT, Quoting, fitted_to, linear_axis, model_file, read_saved
-from xy_sysid.files.seal import sealed
+from xy_sysid.files.linear_models import FORMAT, fitted_to, linear_axis, mat_name, model_file, read_saved, sealed_yaml
 from xy_sysid.files.unasked import free
 from xy_sysid.fitting.of_run import LinearModel
 from xy_sysid.greybox.free_run import GreyboxFit
@@ -56,7 +54,7 @@ def save(model: Model | Mapping[str, Model], path: Path | str, axis: str = "", *
         else:
             document["format"] = AXIS_FORMAT
             document["axes"][name] = _physical(item)
-    write_text(path, sealed(yaml.dump(document, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
+    write_text(path, sealed_yaml(document))
 
 
 def load_model(path: Path | str, axis: str = "", library: Library = STANDARD) -> Model:
@@ -111,8 +109,7 @@ def _written(model: AxisModel, units: Units, parameters: dict[str, Any], errors:
 
 def write_axis_models(path: Path, fits: Mapping[str, GreyboxFit], provenance: Mapping[str, Any]) -> None:
     """Write YAML that ``read_models`` reads. Raises BadRecording if it cannot be written."""
-    text = yaml.dump(axis_document(fits, provenance), Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)
-    write_text(path, sealed(text))
+    write_text(path, sealed_yaml(axis_document(fits, provenance)))
 
 
 def write_axis_mat(path: Path, fits: Mapping[str, GreyboxFit]) -> None:
@@ -121,8 +118,7 @@ def write_axis_mat(path: Path, fits: Mapping[str, GreyboxFit]) -> None:
 
     content: dict[str, Any] = {}
     for axis, fit in fits.items():
-        name = "".join(c if c.isalnum() else "_" for c in axis)
-        name = name if name[:1].isalpha() else f"axis_{name}"
+        name = mat_name(axis)
         tf = linear_part(fit.model)
         content |= {f"{name}_num": tf.numerator, f"{name}_den": tf.denominator, f"{name}_delay": tf.delay}
         content[f"{name}_effects"] = np.array([own for own, _ in fit.model.effects], dtype=object)
@@ -136,6 +132,11 @@ def read_models(path: Path, library: Library) -> Mapping[str, Model]:
     document = model_file(path, (FORMAT, AXIS_FORMAT))
     if document["format"] == FORMAT:
         return {axis: LinearModel(item.tf, item.hold, axis, item.data) for axis, item in read_saved(path).items()}
+    return axis_models(path, document, library)
+
+
+def axis_models(path: Path, document: Mapping[str, Any], library: Library) -> dict[str, PhysicalModel]:
+    """The models of a document of axis models; path: of its file, for errors. Raises BadRecording or BadInput in one line."""
     origin = document.get("provenance")
     found = {}
     for axis, part in document["axes"].items():

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from xy_sysid.axis.model import STANDARD, Library
 from xy_sysid.comparison.physical_model import PhysicalModel
 from xy_sysid.errors import BadInput
-from xy_sysid.files.linear_models import Quoting
-from xy_sysid.files.models import read_models
-from xy_sysid.files.seal import sealed
+from xy_sysid.files.linear_models import sealed_yaml
+from xy_sysid.files.models import AXIS_FORMAT, axis_models
 
 
 def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
     """The newest models of all axes; source: where the stories come from; documents: axis -> story."""
+    return sealed_yaml(_document(source, documents))
+
+
+def _document(source: str, documents: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     axes = {
         axis: {
             "effects": list(model["effects"]),
@@ -31,8 +31,7 @@ def model_text(source: str, documents: Mapping[str, Mapping[str, Any]]) -> str:
         if (model := document.get("model"))
     }
     rates = {axis: document["sampling_rate"] for axis, document in documents.items() if axis in axes and document.get("sampling_rate")}
-    made = {"format": "xy_sysid axis model 1", "provenance": {"source": source, "sampling_rate_hz": rates}, "axes": axes}
-    return sealed(str(yaml.dump(made, Dumper=Quoting, sort_keys=False, width=120, allow_unicode=True)))
+    return {"format": AXIS_FORMAT, "provenance": {"source": source, "sampling_rate_hz": rates}, "axes": axes}
 
 
 def _units(document: Mapping[str, Any]) -> dict[str, str]:
@@ -43,10 +42,6 @@ def _units(document: Mapping[str, Any]) -> dict[str, str]:
 
 def model_of(document: Mapping[str, Any], axis: str, library: Library = STANDARD) -> PhysicalModel:
     """The newest model of a story. Raises BadInput for a story without one."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "story.yaml"
-        path.write_text(model_text("story", {axis: document}), encoding="utf-8")
-        found = read_models(path, library).get(axis) if document.get("model") else None
-    if not isinstance(found, PhysicalModel):
+    if not document.get("model"):
         raise BadInput(f"story of axis {axis}", "without a model", "a model with physical effects", "Diagnose the axis first.")
-    return found
+    return axis_models(Path("story"), _document("story", {axis: document}), library)[axis]

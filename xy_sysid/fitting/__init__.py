@@ -6,13 +6,17 @@ plan, prediction, leakage:    the expected spectra of a model
 lls, iwls, nlls, ml, nllsfdi: estimators: one per file, all with the signature of ``identify``
 identify:                     the default estimator
 covariance, intervals:        uncertainty of a fit
+model_band:                   uncertainty of a fitted model's response, line by line
 finish, result:               the result of a fit
 modes:                        poles only, a faster path
 model_orders, choose_orders:  which orders the data support, and the default orders of a fit
+choose_level:                 orders of a response that does not fall at its highest lines
 verdicts:                     checks of a fit
 check_on_data:                a given model compared with other data
 of_recording:                 from a full recording to responses, axis by axis
 of_run:                       the same for one run, one call per step: response, model
+of_given_response:            fit of a response measured elsewhere
+two_axes:                     coupling of the first two axes of a recording
 """
 
 from __future__ import annotations

@@ -11,4 +11,12 @@ journal:   rows that are not in the table yet; a killed run loses none
 estimate:  the remaining time of a run
 engine:    files -> rows, on the processes of a dask cluster
 of_paths:  all of this in one call
+reference: the effects that are tried first: those of the same axis before
+parts:     a long recording -> rows of its consecutive parts
+history:   the table -> the series of each parameter
+wander, alike: the wander of a parameter without a change; learned from similar machines
+change, presence: whether a parameter has changed, or an effect is named more often
+causes:    from simultaneous changes to the likely cause
+trends, words: all changes of a table, and their sentences
+commissioned, baseline, baseline_words: estimates of a running machine compared with those at commissioning
 """

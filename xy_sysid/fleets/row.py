@@ -75,7 +75,7 @@ def row_of(recording: Recording, axis: str, plan: Plan) -> Row:
     return row
 
 
-def _linear(recording: Recording, run: Run, plan: Plan) -> Row:
+def _linear(_recording: Recording, run: Run, _plan: Plan) -> Row:
     response = frf(run)
     found, checks = _fitted(response)
     return _of_response(response) | _of_transfer_function(found) | {"tf_trustworthy": checks.trustworthy}

@@ -7,6 +7,8 @@ start_inverse:   start values of base and effect together, by linear least squar
 score_test:      part of the error that an effect would explain, to first order
 least_squares:   Levenberg-Marquardt on the whitened error in velocity
 parameters:      the parameters of a model as one row: simulation, bounds, and intervals
+objective:       the score of a model: the likelihood of its error
+forces:          forces of the effects on the measured motion
 free_run:        the fit by free simulation: base alone or with effects, scored on held-out data
 one_step:        the fit of effects that only one-step prediction can judge
 innovation_test: the score test on the innovations of one-step prediction

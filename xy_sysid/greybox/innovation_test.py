@@ -15,7 +15,7 @@ from xy_sysid.axis.model import AxisModel
 from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Companions, FilterFit
 from xy_sysid.effects._scene import Guess
-from xy_sysid.greybox.free_run import AxisData
+from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.one_step import as_companions, companions
 from xy_sysid.greybox.score_test import Projected, Trace, best_trace
 from xy_sysid.greybox.start_rigid import mean_velocity_filter

@@ -2,6 +2,7 @@
 
 criteria:    every threshold of the search
 enough_data: whether the data suffice for a diagnosis
+input_noise: whether a fit's error is noise on its input
 refusal:     why a fit does not count, whatever its error
 compare:     the gain of one fit over another, with its standard error
 starts:      start values for the fit of a set

@@ -4,16 +4,19 @@ reading:              options for reading a file: the meaning of columns
 bag, paired_streams:  two streams of a bag, paired by sample number
 registry:             which reader reads which file, one row per format
 csv, arrays, twincat, codesys, mitsubishi, json_log: files as sheets of columns
-libraries, guarded, leaves: formats that other packages read, in a separate process, as sheets of columns
+text_table, echoed, klipper: the table in a text file; the CSV of ros2 topic echo; accelerations of Klipper
+libraries, guarded, guarded_child, leaves: formats that other packages read, in a separate process, as sheets of columns
 several_files, own_times: columns from several files, and columns with their own times, as one table
 sheet, names, roles:  the role of each column, from its name or from the user
 sheet_table, table, even: columns in SI, numbered by their time, which may be uneven
 clock:                time against the sample counter
+instants:             dates and times in seconds
 foreign_units, given: units of foreign files
 motion:               velocity and acceleration become position
 plausible:            warnings about implausible data
 several, listing:     several recordings as one; the content of a file
 in_parts:             a long recording, part by part
+response_file:        a file with a measured frequency response
 limits:               maximum size of a file in memory
 """
 

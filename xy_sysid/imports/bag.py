@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -14,7 +13,8 @@ from xy_sysid.bags.streaming import Source, Topics, choose, pieces, units
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports.even import drifts, even
 from xy_sysid.imports.given import in_units
-from xy_sysid.imports.paired_streams import LATE, Stream, cut, gather, hollow, is_jitter, pair, steady
+from xy_sysid.imports.limits import room
+from xy_sysid.imports.paired_streams import LATE, Stream, cut, filled, gather, hollow, is_jitter, pair, steady
 from xy_sysid.imports.reading import Reading
 from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.recording import Recording
@@ -22,8 +22,6 @@ from xy_sysid.samples.recording import Recording
 KINDS: tuple[StreamName, ...] = ("voltage", "position")
 WHOLE = 1 << 40  # samples; blocks are not divided
 MARGIN = 1.0  # s around the requested part, for late samples
-COPIES = 4  # memory for pairing, as a multiple of the samples' size
-SHARE = 0.6  # of the machine's memory that a recording may take
 
 
 def load_bag(path: Path, reading: Reading, progress: Callable[[float], None] | None) -> Recording:
@@ -58,7 +56,8 @@ def together(bag: Bag, source: Source, kept: dict[StreamName, list[Block]], firs
     if not all(sum(map(len, kept.get(kind, []))) for kind in KINDS):
         raise BadInput("start", f"{start:g} s", "within the recording", "Begin earlier.")
     same, common = _axes(bag, kept, reading.axes, source.joints is not None, notes)
-    common = _with_numbers(bag, same, common, notes)
+    empty = _empty(same)
+    common = tuple(common[place] for place in filled(common, [axis in empty for axis in common], notes))
     streams: dict[str, Stream] = {kind: gather(kind, blocks, common, notes, bag.bad) for kind, blocks in same.items() if blocks}
     if source.effort:
         streams |= _in_order(path, streams, source.lag, notes)
@@ -120,7 +119,7 @@ def size_of(block: Block) -> int:
 
 def check_room(bag: Bag, size: int) -> None:
     """Raises BadRecording if the memory has no room for this many bytes of samples."""
-    if size > SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / COPIES:
+    if size > room():
         raise bag.bad(f"more than {size / 1e9:.1f} GB of samples, too long to load at once", "Give a part with --span, or replay it.")
 
 
@@ -165,19 +164,15 @@ def _usual(blocks: Sequence[Block]) -> tuple[str, ...]:
     return max(counts, key=lambda axes: counts[axes])
 
 
-def _with_numbers(bag: Bag, blocks: dict[StreamName, list[Block]], axes: tuple[str, ...], notes: list[str]) -> tuple[str, ...]:
-    """The axes without those that have hardly any numbers, unless all are such."""
+def _empty(blocks: dict[StreamName, list[Block]]) -> set[str]:
+    """The axes that have hardly any numbers."""
     empty: set[str] = set()
     for kind in ("voltage", "position"):
         values = [block.values for block in blocks[kind]]
         if all(np.isfinite(one).all() for one in values):
             continue
         empty |= {axis for axis, none in zip(blocks[kind][0].axes, hollow(np.concatenate(values)), strict=True) if none}
-    left = [axis for axis in axes if axis in empty]
-    if not left or len(left) == len(axes):
-        return axes
-    notes.append(f"axis {', '.join(left)} has hardly any numbers; it is left out")
-    return tuple(axis for axis in axes if axis not in empty)
+    return empty
 
 
 def _by_stamp(stream: Stream, by: Stream) -> Stream:

@@ -59,6 +59,15 @@ def hollow(values: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(np.mean(~np.isfinite(values), axis=0) > HOLLOW) if len(values) else np.zeros(values.shape[1], np.bool_)
 
 
+def filled(axes: Sequence[str], empty: Sequence[bool], notes: list[str]) -> list[int]:
+    """Places of the axes that have numbers, all if none has any; those that are left out are added to ``notes``."""
+    left = [axis for axis, none in zip(axes, empty, strict=True) if none]
+    if len(left) in (0, len(axes)):
+        return list(range(len(axes)))
+    notes.append(f"axis {', '.join(left)} has hardly any numbers; it is left out")
+    return [place for place, none in enumerate(empty) if not none]
+
+
 def gather(name: str, blocks: Sequence[Block], axes: tuple[str, ...], notes: list[str], fail: Fail) -> Stream:
     """One stream from blocks, with the columns in the order of ``axes``; rows that are not finite become gaps."""
     size, end = sum(map(len, blocks)), 0

@@ -16,7 +16,7 @@ import numpy as np
 
 from xy_sysid.errors import BadInput, BadRecording
 from xy_sysid.imports import csv
-from xy_sysid.imports.foreign_units import unit_of
+from xy_sysid.imports.foreign_units import TURN, unit_of
 from xy_sysid.imports.reading import Reading
 from xy_sysid.imports.sheet import Column, Sheet, spoken
 from xy_sysid.response.frf import FrequencyResponse
@@ -38,7 +38,6 @@ RADIANS, DEGREES = {"rad", "rads", "radian", "radians"}, {"deg", "degree", "degr
 UNITS = re.compile(r"[^\W\d_]+|[%°]")  # of m/s^2/V they are m, s and V
 DECIBEL = re.compile(r"(?i)(?<![a-z])db(?![a-z])")
 HERTZ = {"hz": 1.0, "khz": 1e3, "MHz": 1e6, "mhz": 1e-3}
-TURN = 2 * np.pi
 JUMP = 0.5  # rad; a phase whose usual step from line to line is larger, modulo a turn, is not smooth
 EXAMPLE = "Name them with --map frequency=1,magnitude=2,phase=3, or real= and imag= (see xy-sysid columns FILE)."
 

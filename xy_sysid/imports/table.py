@@ -14,7 +14,7 @@ from xy_sysid.imports.clock import disagreements
 from xy_sysid.imports.even import even
 from xy_sysid.imports.foreign_units import Quantity
 from xy_sysid.imports.motion import leaps, unwrapped, wraps
-from xy_sysid.imports.paired_streams import LARGEST, cut, hollow, sane
+from xy_sysid.imports.paired_streams import LARGEST, cut, filled, hollow, sane
 from xy_sysid.imports.reading import Reading
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.samples.recording import Recording, rate_from_time
@@ -78,7 +78,8 @@ def uncut(path: Path, table: Table, reading: Reading, notes: list[str]) -> tuple
     """The whole table, checked and numbered, and the instant from which its parts count, s. Raises BadRecording or BadInput."""
     _same_length(path, table)
     time = _time(path, table)
-    columns = _whole(path, table, places_of(table.axes, reading.axes), notes)
+    wanted, empty = places_of(table.axes, reading.axes), hollow(table.output) | hollow(table.input)
+    columns = [wanted[place] for place in filled([table.axes[place] for place in wanted], [bool(empty[place]) for place in wanted], notes)]
     rows = _unwrapped(table, _finite(path, table, columns, time, notes), notes)
     first = float(rows.time[0])
     rows, rate = _numbered(path, table, rows, notes)
@@ -212,17 +213,6 @@ def _each_once(path: Path, table: Table, rows: _Rows, notes: list[str]) -> _Rows
         raise BadRecording(path, "seq does not increase", "Sort the samples by seq.")
     notes.append(f"{int(np.sum(~fresh))} samples are there twice; the first is kept")
     return rows.only(fresh)
-
-
-def _whole(path: Path, table: Table, columns: list[int], notes: list[str]) -> list[int]:
-    """The axes without those that have hardly any numbers, unless all are such."""
-    empty = hollow(table.output) | hollow(table.input)
-    left = [place for place in columns if empty[place]]
-    if not left or len(left) == len(columns):
-        return columns
-    names = ", ".join(table.axes[place] for place in left)
-    notes.append(f"axis {names} has hardly any numbers; it is left out")
-    return [place for place in columns if place not in left]
 
 
 def places_of(axes: tuple[str, ...], wanted: Sequence[str] | None) -> list[int]:

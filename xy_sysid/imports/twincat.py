@@ -16,7 +16,6 @@ from xy_sysid.imports.sheet import Column, Sheet
 from xy_sysid.imports.text_table import number_of
 
 TIME = "SampleTime"  # label of the line that gives the unit of the times
-LABELS = ("SymbolComment", "Data-Type", "Unit")  # labels of other header lines of a channel
 
 
 def sheet(path: Path) -> Sheet:

@@ -6,7 +6,7 @@ Computer-Controlled Systems, 3rd ed., sec. 2.3 and 3.2).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -137,24 +137,6 @@ def held_response(tf: TransferFunction, frequency: FloatArray, sampling_rate: fl
     state = np.linalg.solve(z[:, None, None] * np.eye(s.out.size) - s.step, driven[:, :, None])[:, :, 0]
     value = (state @ s.out + s.direct_new + s.direct_old / z) * z ** -float(s.whole)
     return np.asarray(np.where(standing, tf.response(np.zeros_like(turns)), value), dtype=np.complex128)
-
-
-def discrete(tf: TransferFunction, sampling_rate: float) -> TransferFunction:
-    """The exact z form after a zero-order hold; a fractional delay adds one pole at z = 0."""
-    if tf.sampling_time is not None:
-        return tf
-    s = stepper(tf, sampling_rate)
-    order = s.out.size
-    denominator = np.real(np.poly(np.exp(tf.poles() / sampling_rate))) if order else np.ones(1)
-    if np.any(s.old != 0) or s.direct_old != 0:
-        denominator = np.append(denominator, 0.0)
-    impulse = np.zeros(denominator.size)
-    impulse[0] = 1.0
-    markov = _run(s.step, s.new, s.old, s.out, s.direct_new, s.direct_old, 0, impulse)
-    numerator = np.convolve(denominator, markov)[: denominator.size]
-    return replace(
-        tf, numerator=np.trim_zeros(numerator, "f"), denominator=denominator, delay=s.whole / sampling_rate, sampling_time=1.0 / sampling_rate
-    )
 
 
 RUNS_AWAY = -1e5  # per cent; below it (an error of a thousand times the motion) no number is given

@@ -15,7 +15,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.nodes.quality import Overridable
 from xy_sysid.nodes.run import run_node
 from xy_sysid.nodes.wall import Wall
-from xy_sysid.settings import AXES, Knob, Settings, build, changed, knobs, of_other_axes, unknown_name
+from xy_sysid.settings import AXES, NAMESPACE, Knob, Settings, build, changed, knobs, of_other_axes, unknown_name
 
 __all__ = [
     "DATA_QOS",
@@ -27,10 +27,8 @@ __all__ = [
     "WalledNode",
     "declare",
     "run_node",
-    "settings_from_parameters",
 ]
 
-NAMESPACE = "/xy"
 AnySettings = TypeVar("AnySettings", bound=Settings)
 
 # Ten seconds of 20-row blocks at 2 kHz: queues overflow without an error, so they are longer than any stall.
@@ -105,12 +103,6 @@ def overrides(node: Node) -> dict[str, Any]:
     """Parameters from the command line or a file, for a node made with automatically_declare_parameters_from_overrides."""
     given = cast("dict[str, Parameter]", node.get_parameters_by_prefix(""))
     return {name: parameter.value for name, parameter in given.items() if not name.startswith(OF_ROS)}
-
-
-def settings_from_parameters(node: Node, cls: type[AnySettings]) -> AnySettings:
-    """The settings with the node's given parameter values; raises BadInput if they are inconsistent."""
-    known = {item.name for item in knobs(cls())}
-    return build(cls, {name: value for name, value in overrides(node).items() if name in known}, f"node {node.get_name()}")
 
 
 def declare(

@@ -6,16 +6,13 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.signals import SignalHandlerOptions
 
 from xy_sysid.errors import BadInput
+from xy_sysid.nodes.own_context import OwnContext
 from xy_sysid.settings import ExcitationSettings, build, knobs
 
 ANSWER = 10.0  # s to wait for an answer of the excitation while its node is present
@@ -25,21 +22,12 @@ SOON = 1.0  # s instead, if the user wants to stop, since a running excitation m
 NODE = "excitation"
 
 
-class ExcitationClient:
+class ExcitationClient(OwnContext):
     """A separate node, in the thread that calls it. ended: called often; true if the user wants to stop."""
 
     def __init__(self, name: str, ended: Callable[[], bool], namespace: str) -> None:
+        super().__init__(name, namespace)
         self._is_over = ended
-        self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node: Any = rclpy.create_node(name, namespace=namespace, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-
-    def close(self) -> None:
-        """Remove the node from the graph."""
-        self._node.destroy_node()
-        self._context.try_shutdown()
 
     def wait(self, seconds: float) -> None:
         until = time.monotonic() + seconds

@@ -1,6 +1,6 @@
 """Identifier node: receives voltage and position; publishes frequency response, transfer function, comparison and metrics.
 
-A thin adapter: the logic is ``identifier.Identifier`` on the data path and ``live_fit.LiveFitter`` in a separate thread, so
+A thin adapter: the logic is ``identifier.Identifier`` on the data path and ``fitter.LiveFitter`` in a separate thread, so
 data never wait for a fit.
 """
 

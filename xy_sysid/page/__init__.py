@@ -1,5 +1,5 @@
 """The page: live results of the identifier, or a recording, shown in a browser.
 
-``access``, ``facts``, ``topics_state``, ``orders`` and ``library`` are pure; ``worker``, ``link`` and ``server`` do the work; the
+``access``, ``facts``, ``topics_state`` and ``orders`` are pure; ``worker``, ``link`` and ``server`` do the work; the
 other files draw.
 """

@@ -17,21 +17,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Bool, Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 from xy_sysid.live.plain_messages import StatusMessage
 from xy_sysid.nodes.common import LATCHED_QOS, NAMESPACE, STOP_TOPIC
 from xy_sysid.nodes.convert import array_from_ros
+from xy_sysid.nodes.own_context import OwnContext
 from xy_sysid.nodes.wall import Wall
 from xy_sysid.page.topics_state import COUPLING, TopicsState
 
@@ -172,27 +169,20 @@ class Link:
         self._say("the link to the nodes is restored")
 
 
-class _StopWire:
+class _StopWire(OwnContext):
     """The publisher of STOP: a node that needs no thread and is independent of the link, which may fail.
 
     name: unique to this server, so that it never takes another page's STOP for its own.
     """
 
     def __init__(self, namespace: str) -> None:
-        self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self.name = f"{STOPS}_{re.sub('[^A-Za-z0-9]', '_', socket.gethostname())}_{os.getpid()}"
-        self._node: Any = rclpy.create_node(self.name, namespace=namespace, context=self._context)
+        super().__init__(self.name, namespace)
         self._topic = self._node.create_publisher(Bool, STOP_TOPIC, LATCHED_QOS)
 
     def put(self, on: bool) -> None:
         """Publish STOP, or its release; latched."""
         self._topic.publish(Bool(data=on))
-
-    def close(self) -> None:
-        """Remove the node from the graph."""
-        self._node.destroy_node()
-        self._context.try_shutdown()
 
 
 @dataclass
@@ -211,19 +201,15 @@ class _Stop:
             self.told(True, f"stopped: the excitation is {state}, the voltage is zero")
 
 
-class _Line:
+class _Line(OwnContext):
     """One node in one thread; if it dies, ``Link`` replaces it."""
 
     def __init__(self, heard: TopicsState, namespace: str, orders: queue.SimpleQueue[Callable[[_Line], None]], say: Callable[[str], None]) -> None:
+        super().__init__("page", namespace)
         self.heard = heard
         self.wall = Wall(say)
         self.beat = time.monotonic()
         self._orders, self._ended = orders, threading.Event()
-        self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
-        self._node: Any = rclpy.create_node("page", namespace=namespace, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
         self._clients: dict[str, Any] = {}
         self._topics: set[str] = set()
         self._waiting: list[_Asked] = []
@@ -308,8 +294,7 @@ class _Line:
             while not self._ended.is_set() and self._context.ok():
                 self._turn()
         finally:
-            self._node.destroy_node()
-            self._context.try_shutdown()
+            super().close()
 
     def _turn(self) -> None:
         self.beat = time.monotonic()

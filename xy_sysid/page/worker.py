@@ -57,7 +57,7 @@ class Desk:
 
     def do(self, order: Order) -> None:
         """Carry out one order, as the node and the replay do (``story.acts``). Raises XySysidError with a sentence, or Left."""
-        from xy_sysid.greybox.free_run import EPSILON
+        from xy_sysid.greybox.axis_data import EPSILON
         from xy_sysid.samples.moves import several_moves
         from xy_sysid.story.acts import Job
         from xy_sysid.story.story import added, diagnosed, removed

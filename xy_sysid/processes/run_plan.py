@@ -11,7 +11,7 @@ from typing import Any
 
 from xy_sysid.errors import BadInput
 from xy_sysid.files.ros_parameters import NODES, checked, load, parameters
-from xy_sysid.settings import unknown_name
+from xy_sysid.settings import NAMESPACE, unknown_name
 
 MODULES = {
     "excitation": "xy_sysid.nodes.excitation",
@@ -35,7 +35,6 @@ NODE_KEYS = {
     "optional": (bool, "true or false"),
 }
 FILE_KEYS = {"namespace": NODE_KEYS["namespace"], "env": NODE_KEYS["env"], "nodes": (list, "a list of nodes")}
-NAMESPACE = "/xy"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ import os
 import signal
 import sys
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 from xy_sysid.excitation.trajectory import Trajectory
 from xy_sysid.files.effects import library
 from xy_sysid.files.walk import plan_of, run_of, step_document
+from xy_sysid.processes.deaf import deaf
 from xy_sysid.processes.terminal import printable
 from xy_sysid.story.attempt import Attempt
 
@@ -41,12 +41,8 @@ class Decider:
         """plan: its document."""
         self._pipe, there = multiprocessing.Pipe()
         self._process = multiprocessing.get_context("spawn").Process(target=work, args=(there, plan, effect_files), name="settle", daemon=True)
-        resource_tracker.ensure_running()  # its own start would let SIGINT through again
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # the child inherits it: Ctrl-C is for its parent
-        try:
+        with deaf():
             self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         there.close()
 
     def ask(self, bag: Path) -> None:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from xy_sysid.axis.model import STANDARD, Library
+from xy_sysid.comparison.of_run import HELD_OUT
 from xy_sysid.diagnosis.refine import never
 from xy_sysid.errors import BadInput
 from xy_sysid.fitting.of_recording import judged, split
@@ -28,7 +29,6 @@ from xy_sysid.settings import IdentifierSettings
 from xy_sysid.story.document import document
 from xy_sysid.story.story import tell as whole_story
 
-HELD_OUT = 1.0 / 3.0  # of the recording, as in every story
 LONGEST = 600.0  # s of data for the story: more would not improve it and needs memory (2 MB per second at 2 kHz)
 MOST_SENT = 1 << 27  # bytes of positions; a longer recording is not copied to another process
 STAGES = ("response and fits", "diagnosis")

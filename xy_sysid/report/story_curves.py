@@ -57,7 +57,7 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
     return figure
 
 
-def coherence(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
+def coherence(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:  # noqa: ARG001
     """Coherence of every line: 1 where the input explains all of the output; untrusted lines in grey."""
     if document["measured"] is None:
         return nothing(document["sentence"], mode)

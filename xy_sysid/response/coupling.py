@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from xy_sysid.errors import BadInput
 from xy_sysid.jit import compiled
-from xy_sysid.response.frf import ComplexArray, FrequencyResponse
+from xy_sysid.response.frf import ComplexArray
 from xy_sysid.response.h1 import divisor
 from xy_sysid.response.windows import WindowShape, error_correlation
 from xy_sysid.samples.block import FloatArray
@@ -211,22 +211,6 @@ def coupling_of(
 def _diagonal(matrices: ComplexArray) -> FloatArray:
     """(lines, 2) real parts of the diagonals of (lines, 2, 2)."""
     return np.asarray(matrices.real[:, (0, 1), (0, 1)])
-
-
-def single(found: Coupling, output: int, driven: int, recording: Recording) -> FrequencyResponse:
-    """One of the four responses as a FrequencyResponse; output, driven: 0 or 1, the axes of output and input."""
-    return FrequencyResponse(
-        frequency=found.frequency,
-        response=found.response[:, output, driven],
-        coherence=np.ones(found.frequency.size),
-        sigma=found.sigma[:, output, driven],
-        trusted=np.isfinite(found.sigma[:, output, driven]),
-        sampling_rate=recording.sampling_rate,
-        averages=FEWEST,
-        resolution=float(found.frequency[1] - found.frequency[0]),
-        input_unit=recording.units.input,
-        output_unit=recording.units.measured,
-    )
 
 
 def _of_recording(recording: Recording, u: FloatArray, y: FloatArray, shape: WindowShape) -> CrossSpectra:

@@ -51,14 +51,13 @@ class Minimized:
 
     values: (p,); covariance: (p, p), infinite on the diagonal for undetermined parameters; error: (n,) measured minus simulated
     independent: effective number of independent samples of the error; cost: rms of the error
-    weakest: (p,) the least determined combination of scaled parameters; flatness: its singular value relative to the largest
+    flatness: singular value of the least determined combination of scaled parameters, relative to the largest
     """
 
     values: FloatArray
     covariance: FloatArray
     error: FloatArray
     independent: float
-    weakest: FloatArray
     flatness: float
 
     @property
@@ -137,10 +136,10 @@ def _judged(values: FloatArray, error: FloatArray, slope: FloatArray, sizes: Seq
     count = float(seen.sum())
     independent = max(error.size / max(inflation, 1.0), count + 1.0)
     covariance = np.full((values.size, values.size), np.inf)
-    weakest, flatness = np.zeros(values.size), 0.0
+    flatness = 0.0
     if bool(seen.all()):
-        _, sizes_of, right = np.linalg.svd(slope / norms, full_matrices=False)
-        weakest, flatness = right[-1], float(sizes_of[-1] / sizes_of[0])
+        sizes_of = np.linalg.svd(slope / norms, full_matrices=False)[1]
+        flatness = float(sizes_of[-1] / sizes_of[0])
         if flatness > FLAT:
             inverse = np.linalg.inv((slope / norms).T @ (slope / norms))
             scores = (slope / norms) * error[:, None]
@@ -153,7 +152,7 @@ def _judged(values: FloatArray, error: FloatArray, slope: FloatArray, sizes: Seq
                         meat += (1.0 - lag / lags) * (cross + cross.T)
             spread = inverse @ meat @ inverse * error.size / max(error.size - count, 1.0)
             covariance = spread / np.outer(norms, norms)
-    return Minimized(values=values, covariance=covariance, error=error, independent=independent, weakest=weakest, flatness=flatness)
+    return Minimized(values=values, covariance=covariance, error=error, independent=independent, flatness=flatness)
 
 
 def _memory(error: FloatArray, parts: Sequence[slice]) -> int:

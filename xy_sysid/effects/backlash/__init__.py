@@ -3,6 +3,7 @@
 contact:         its fit by one-step prediction, in stages
 innovations:     innovations of the filter, as a function of the fitted numbers
 starts:          start values of a fit
+usual_machine:   a task on the scales of the reference machine
 contact_filter:  the compiled filter for the laws of dry friction that act with it
 filter_source:   its source text, made from these laws
 filter_template: template of that text

@@ -1,4 +1,4 @@
-"""The table of columns of docs/fleet.md, made from ``columns``: python -m xy_sysid.fleets.columns_doc --write"""
+"""The table of columns of docs/fleet.md, made from ``columns``: python -m campaigns.documents.fleet_columns --write"""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Layouts that open the topics of this package in PlotJuggler and Foxglove, made from the columns and names of the messages.
 
-    python -m xy_sysid.files.viewer_layouts plotjuggler > config/plotjuggler.xml
-    python -m xy_sysid.files.viewer_layouts foxglove > config/foxglove.json
+    python -m campaigns.documents.viewer_layouts plotjuggler > config/plotjuggler.xml
+    python -m campaigns.documents.viewer_layouts foxglove > config/foxglove.json
 
 How they address fields. PlotJuggler: ``/topic/data[k]`` for an array, ``/topic/hardware_id/status/key`` for diagnostics, whose values
 it reads as numbers. Foxglove: ``/topic.data[k]``, ``/topic.status[:]{name=="axis x"}.values[:]{key=="..."}.value``; as it has no
@@ -20,8 +20,8 @@ from xy_sysid.live.diagnosis_messages import LADDER_COLUMNS
 from xy_sysid.live.messages import COMPARISON_COLUMNS
 from xy_sysid.live.plain_messages import topic_of
 from xy_sysid.samples.block import columns
+from xy_sysid.settings import NAMESPACE
 
-NAMESPACE = "/xy"
 AXES = ("x", "y")
 COLOURS = ("#2f7fd0", "#d9691e", "#1a9a6c", "#9a62d0")
 LARGEST_BLOCK = 400  # numbers in a block of samples that PlotJuggler keeps; a response has thousands and is omitted
@@ -149,5 +149,5 @@ def _stacked(direction: str, names: Sequence[Any]) -> Any:
 if __name__ == "__main__":
     made = {"plotjuggler": plotjuggler, "foxglove": foxglove}
     if len(sys.argv) != 2 or sys.argv[1] not in made:
-        sys.exit(f"usage: python -m xy_sysid.files.viewer_layouts {' | '.join(made)}")
+        sys.exit(f"usage: python -m campaigns.documents.viewer_layouts {' | '.join(made)}")
     sys.stdout.write(made[sys.argv[1]]())
