@@ -14,6 +14,11 @@ from xy_sysid.hypotheses import criteria
 CRITERIA = ROOT / "xy_sysid" / "hypotheses" / "criteria.py"
 STEERED = [path for package in ("hypotheses", "diagnosis") for path in sorted((ROOT / "xy_sysid" / package).glob("*.py")) if path != CRITERIA]
 
+DECIDING = [path for package in ("hypotheses", "diagnosis", "greybox", "effects", "story") for path in (ROOT / "xy_sysid" / package).rglob("*.py")]
+BOUNDS = ("min", "max", "minimum", "maximum", "clip", "quantile", "percentile")
+PLAIN = {0, 0.5, 1, 2, 3, 4, 12}  # counts, halves and quarters, signs and squares; the variance of rounding is 1/12
+GUARD = 1e-6
+
 
 def bare_numbers(path: Path) -> list[str]:
     """Names of a module's numeric constants, except zeros."""
@@ -67,6 +72,32 @@ def test_no_other_module_of_the_search_holds_a_number_of_its_own(path: Path) -> 
     """A number that steers the search is in criteria, with its reason."""
     numbers = bare_numbers(path)
     assert not numbers, f"{path.name} holds {', '.join(numbers)}: put them into criteria"
+
+
+def bare_comparisons(path: Path) -> list[str]:
+    """Numbers without a name in comparisons, bounds and quantiles of a module; small ones only avoid a division by zero."""
+    found = []
+    for item in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        called = ast.unparse(item.func).rsplit(".", 1)[-1] if isinstance(item, ast.Call) else ""
+        bounds = isinstance(item, ast.Call) and called in BOUNDS and "effects" not in path.parts  # an effect's start values have bounds
+        if isinstance(item, ast.Compare) or bounds:
+            values = [node.value for node in ast.walk(item) if isinstance(node, ast.Constant)]
+            numbers = [value for value in values if isinstance(value, int | float) and value not in PLAIN and value > GUARD]
+            found += [f"line {item.lineno}: {number:g}" for number in numbers]
+    return found
+
+
+def test_a_number_that_decides_has_a_name() -> None:
+    """In comparisons, bounds and quantiles of search, grey box and story, and in comparisons of effects."""
+    wrong = {str(path.relative_to(ROOT)): bare for path in DECIDING if (bare := bare_comparisons(path))}
+    assert not wrong
+
+
+def test_a_number_without_a_name_is_noticed(tmp_path: Path) -> None:
+    """A threshold, a bound and a quantile; but no count, no half, and no guard of a division."""
+    path = tmp_path / "one.py"
+    path.write_text("a = x > 0.3\nb = min(x, 7.0)\nc = np.quantile(x, 0.9)\nd = x > 0.0 and y / max(z, 1e-300) > x[2] / 2\n", encoding="utf-8")
+    assert bare_comparisons(path) == ["line 1: 0.3", "line 2: 7", "line 3: 0.9"]
 
 
 def test_the_page_of_the_search_has_the_table() -> None:

@@ -21,6 +21,9 @@ from xy_sysid.effects._scene import Guess, Scene, columns
 from xy_sysid.samples.block import FloatArray
 
 _DAMPING = 0.03  # damping ratio of the first guess; real frames and screws have 0.01 to 0.1
+_HIGHEST = 0.35  # of the sampling rate: lines of a response
+_WEAKEST = 1e-3  # power of a line of the input over the largest
+_COHERENT = 0.1  # least coherence of a line; its weight falls with it
 _LIKELY = 4  # most frequencies whose traces are computed
 
 
@@ -57,7 +60,7 @@ def guesses(scene: Scene, low: float, high: float) -> Iterator[Guess]:
 
 def traces(scene: Scene, low: float, high: float) -> Iterator[tuple[FloatArray, float]]:
     """(2, n) traces of the most likely poles between ``low`` and ``high`` (Hz), and their frequencies; none if sampling is too slow."""
-    top = min(high, 0.35 * scene.sampling_rate)
+    top = min(high, _HIGHEST * scene.sampling_rate)
     if top <= low:
         return
     model = scene.velocity - scene.error
@@ -93,7 +96,7 @@ def _error_spectra(scene: Scene) -> tuple[FloatArray, FloatArray, NDArray[np.com
     f, seen = _spectra(scene)
     error, model = seen[2], seen[1] - seen[2]
     power, own, cross = _mean(model, model).real, _mean(error, error).real, _mean(model, error)
-    used = (f > 0.0) & (f < 0.35 * scene.sampling_rate) & (power > 0.0) & (own > 0.0)
+    used = (f > 0.0) & (f < _HIGHEST * scene.sampling_rate) & (power > 0.0) & (own > 0.0)
     return f[used], power[used], cross[used], (1.0 / np.where(used, own * f, 1.0))[used]
 
 
@@ -201,6 +204,6 @@ def _response(scene: Scene) -> tuple[FloatArray, NDArray[np.complex128], FloatAr
     f, (voltage, velocity, _) = _spectra(scene)
     cross, power, output = _mean(voltage, velocity), _mean(voltage, voltage).real, _mean(velocity, velocity).real
     coherence = np.clip(np.abs(cross) ** 2 / np.maximum(power * output, 1e-300), 0.0, 0.9999)
-    used = (f > 0.0) & (f < 0.35 * scene.sampling_rate) & (power > 1e-3 * np.max(power)) & (coherence > 0.1)
+    used = (f > 0.0) & (f < _HIGHEST * scene.sampling_rate) & (power > _WEAKEST * np.max(power)) & (coherence > _COHERENT)
     weight = np.sqrt(coherence / (1.0 - coherence))
     return f[used], np.asarray(cross[used] / power[used]), np.asarray(weight[used])

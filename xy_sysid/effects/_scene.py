@@ -93,14 +93,20 @@ class Scene:
         e = self.smooth(self.error, 100.0)
         return -(np.gradient(e) * self.sampling_rate / self.pole + e) / self.gain
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Ends of the travel, m, without its outermost hundredths."""
+        low, high = np.quantile(self.position, [0.01, 0.99])
+        return float(low), float(high)
+
     def periods(self, numerator: FloatArray, denominator: FloatArray, count: int = 4, least: float = REPEATS) -> list[float]:
         """Period lengths (m) of numerator / denominator along the travel, strongest first, at most ``count``.
 
         Only lengths with at least ``least`` periods within the travel. At each length a sine is
         fitted along the travel, weighted by the denominator (Lomb 1976; Zechmeister & Kurster 2009, eq. 5), and less towards the ends.
         """
-        low, high = np.quantile(self.position, [0.01, 0.99])
-        travel = float(high - low)
+        low, high = self.ends
+        travel = high - low
         if travel <= 0.0:
             return []
         place = np.clip(((self.position - low) / travel * PLACES).astype(np.int64), 0, PLACES - 1)

@@ -21,7 +21,7 @@ def force(amplitude: float, phase: float, x: float, gain: float) -> float:
 
 def guesses(scene: Scene) -> Iterator[Guess]:
     """Sine and cosine of the position, an angle; none if the travel is too short to distinguish them from a load and a spring."""
-    low, high = np.quantile(scene.position, [0.01, 0.99])
+    low, high = scene.ends
     way = math.copysign(1.0, scene.gain)
     if high - low >= LEAST:
         yield Guess(

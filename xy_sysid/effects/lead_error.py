@@ -11,6 +11,8 @@ import numpy as np
 from xy_sysid.effects._contract import Effect, Parameter, law
 from xy_sysid.effects._scene import Guess, Scene, columns, wave
 
+STEEPEST = 0.2  # change of the reading over the motion that no encoder has
+
 
 @law
 def error(amplitude: float, period: float, phase: float, x: float) -> float:
@@ -29,9 +31,9 @@ def guesses(scene: Scene) -> Iterator[Guess]:
 
 
 def refusal(values: Sequence[float], between: tuple[float, float]) -> str:
-    """Rejects a slope of 0.2 or more, and less than half a period within the travel: such an error could explain any signal."""
+    """Rejects a slope of STEEPEST or more, and less than half a period within the travel: such an error could explain any signal."""
     slope, repeats = 2.0 * math.pi * values[0] / values[1], (between[1] - between[0]) / values[1]
-    if slope >= 0.2:
+    if slope >= STEEPEST:
         return f"the reading would change by {100 * slope:.3g} % more or less than the motion: no encoder does that"
     return "" if repeats >= 0.5 else f"only {repeats:.2g} of its periods are within the travel, so the data do not show whether it repeats"
 

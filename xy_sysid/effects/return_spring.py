@@ -25,8 +25,7 @@ def guesses(scene: Scene) -> Iterator[Guess]:
     x, way = scene.position, math.copysign(1.0, scene.gain)
     least = LEAST * scene.similar.factor("V/m")
     yield Guess(columns(way * x, np.full_like(x, way)), lambda c: (max(float(c[0]), least), -float(c[1]) / max(float(c[0]), least), 0.0))
-    low, high = np.quantile(x, [0.01, 0.99])
-    middle = 0.5 * float(low + high)
+    middle = 0.5 * sum(scene.ends)
     far = x - middle
     yield Guess(columns(way * far, way * far**3), lambda c: (max(float(c[0]), least), middle, -float(c[1]) / max(float(c[0]), least)))
 

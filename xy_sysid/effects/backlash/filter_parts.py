@@ -6,6 +6,7 @@ import math
 
 from xy_sysid.effects._contract import law
 
+FLAT = 18.0  # argument above which tanh is 1 in double precision, nearly
 Four = tuple[float, float, float, float]
 Covariance = tuple[float, float, float, float, float, float, float, float, float, float]  # xx, xv, xd, xw, vv, vd, vw, dd, dw, ww
 
@@ -27,7 +28,7 @@ def contact(apart: float, rate: float, half: float, k: float, c: float, loss: fl
 @law
 def smooth_sign(v: float, slow: float) -> float:
     """tanh(v / slow), three times as fast."""
-    if abs(v) > 18.0 * slow:
+    if abs(v) > FLAT * slow:
         return 1.0 if v > 0.0 else -1.0
     steep = math.exp(-2.0 * abs(v) / slow)
     return math.copysign((1.0 - steep) / (1.0 + steep), v)

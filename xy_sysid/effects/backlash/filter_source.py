@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 from xy_sysid.effects._binding import call
 from xy_sysid.effects._contract import Effect, arguments
+from xy_sysid.effects.backlash.filter_parts import FLAT
 from xy_sysid.effects.backlash.filter_template import TEMPLATE
 from xy_sysid.errors import BadInput
 
 NAMES = ("gain", "delay", "pole", "gap", "share", "rate", "damping", "loss", "guide", "hertz", "rub")  # followed by those of friction
 SLOW = 1e-3  # m/s at which the smoothed friction reaches tanh(1) = 76 % of its level
-FAST = 18.0 * SLOW  # m/s above which smoothing has no effect
+FAST = FLAT * SLOW  # m/s above which smoothing has no effect
 NUDGE = 1e-7  # m/s, for the derivative of a law by speed
 
 
