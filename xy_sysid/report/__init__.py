@@ -9,5 +9,5 @@ report_page:    the page; written: a report of a recording, as the command and n
 trend_page:     the trend of a fleet as one page
 gallery, drawers: every figure of a story, drawn in other processes
 figure_data, vector, paper: a figure as a table, as vectors, and in the size of a journal
-plots, notebook: single pictures, and results as a notebook shows them
+plots, notebook, offline: single pictures, and results as a notebook shows them, also without a network
 """
