@@ -49,7 +49,7 @@ def replay(
     from xy_sysid.live.identifier import Identifier
     from xy_sysid.live.replay import replay as logic
     from xy_sysid.processes.run_plan import Told
-    from xy_sysid.samples.pairing import QUANTITIES
+    from xy_sysid.response.methods import METHODS
     from xy_sysid.settings import DiagnoserSettings, changed, given
     from xy_sysid.story.acts import sentence as words
     from xy_sysid.story.document import document
@@ -80,8 +80,7 @@ def replay(
         output: JointOutput | None = "velocity" if settings.output == "velocity" else None
         wanted = Topics(effort_as_voltage=effort or settings.effort_as_voltage, joints=joints, effort_lag=lag, output=output, **names)
         heard = stream_blocks(bag, wanted, notes=notes, about=units.append)
-        wanted_streams = QUANTITIES if settings.response == "h1" else (*QUANTITIES, "reference")
-        blocks = (item for item in heard if item[0] in wanted_streams)
+        blocks = (item for item in heard if item[0] in METHODS[settings.response].streams)
         kind, first = next(blocks, (None, None))
         if kind is None or first is None:
             raise BadRecording(bag, "holds no samples", "Give a bag with voltage and position.")

@@ -83,7 +83,7 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         period = find_period(repeats[longest])
         if period and r is None and _samples(longest) < MANY * period and _distorted(recording, axis, longest):
             period = None
-        alone = period is None and r is None and method.tapered and (settings.differenced or integrated) and not _closed_loop(recording, axis)
+        alone = period is None and method.plain and (settings.differenced or integrated) and not _closed_loop(recording, axis)
         half = find_half_period(u[longest]) if alone else None
     elif period:
         notes += period_note(repeats[longest], period)
@@ -125,7 +125,7 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     sums = method.whole(cut, shape, settings.differenced)
     frf = method.estimate(sums, shape, recording.sampling_rate, options)
     notes += [method.note] if method.note else []
-    if period and r is None and not half and settings.response == "h1":
+    if period and not half and method.plain:
         frf = best_linear(frf, _realisations([(u, y) for _, u, y in pieces], period, settings.differenced))
         notes += [BEST] if frf.noise.size else []
     frf = replace(frf, sigma=np.maximum(frf.sigma, ROUNDING * np.abs(frf.response)))
