@@ -16,9 +16,9 @@ from xy_sysid.errors import BadInput
 from xy_sysid.fitting import identify
 from xy_sysid.fitting.choose_orders import Choice, choose, stands
 from xy_sysid.fitting.modes import pole_estimates
-from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.result import POOR_ERROR, Fit
 from xy_sysid.fitting.structure import FitOptions, structure_from
-from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import LIGHT_DAMPING, TransferFunction
 from xy_sysid.live.coupling_messages import coupling_messages, coupling_status
 from xy_sysid.live.identifier import AxisRequest, FitRequest
 from xy_sysid.live.messages import comparison_message, frf_message, transfer_function_message
@@ -35,11 +35,9 @@ from xy_sysid.samples.pairing import QUANTITIES, Pairer
 from xy_sysid.samples.ring import RATE_SAMPLES
 from xy_sysid.settings import IdentifierSettings
 
-LIGHT_DAMPING = 0.4  # a pole pair with more damping is not a resonance to watch
 FIRST_FITS = 3  # fits in which a warm start that noise does not explain is checked against a cold start
 LATER_DOUBT = 15  # later, one of this many fits: noise never explains an axis with friction, and a cold start is slow
 OPTIONS = FitOptions(relative_change=1e-6)  # of the cost: leaves at most a hundredth of a standard error
-GOOD_ERROR = 0.05  # relative error above which an axis's sentence says that the model does not fit yet
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +212,7 @@ def _verdict(axis: str, update: AxisUpdate, request: FitRequest) -> tuple[int, s
         return ERROR, alarm_sentence(axis, update.track)
     if fit is None or not fit.converged:
         return WARN, f"axis {axis}: the fit did not converge: {fit.reason if fit else update.problem}"
-    if fit.relative_error > GOOD_ERROR:
+    if fit.relative_error > POOR_ERROR:
         return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; the model does not fit (yet)"
     if request.going_on[axis]:
         reasons = ", ".join(request.going_on[axis])

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from xy_sysid.fitting.result import GOOD_ERROR, POOR_ERROR
+from xy_sysid.linear.transfer_function import LIGHT_DAMPING
 from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.page.topics_state import columns
 from xy_sysid.report.story_curves import between
@@ -20,8 +22,6 @@ from xy_sysid.samples.block import FloatArray
 Values = Mapping[str, str]
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 ENOUGH = 12  # windows
-LIGHT = 0.4  # damping ratio above which a pair is not called a resonance
-GOOD_ERROR, POOR_ERROR = 0.02, 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
         found.append(Fact(label, text, meaning + (UNSURE if fails else ""), sure=not fails))
     for kind, label in (("zeros", "antiresonance"), ("poles", "resonance")):
         for root in pictures["linear"][kind] if pictures is not None else ():
-            if root["imag"] and root["frequency"] and root["damping"] is not None and root["damping"] < LIGHT:
+            if root["imag"] and root["frequency"] and root["damping"] is not None and root["damping"] < LIGHT_DAMPING:
                 shown = f"{number(root['frequency'], 4)} Hz, damping {number(root['damping'], 2)}"
                 found.append(Fact(label, shown, MEANINGS[label], sure=not fails))
     return found

@@ -18,10 +18,10 @@ from xy_sysid.report.story_parts import LINE, NAMED, grey
 from xy_sysid.report.theme import BEFORE, FAILS, MEASURED, MODEL, UNTRUSTED, fade
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.settings import LEAST_COHERENCE
 from xy_sysid.units import USUAL, Units, over, readable
 
 MOST = 1200  # lines drawn
-LEAST = 0.3  # coherence of a trusted line
 SOLID, DASHED = {"color": MEASURED, "width": 1.8}, {"color": MODEL, "width": 1.8, "dash": "dash"}
 NOTABLE = 4.0  # standard errors above which a range of lines is shaded
 STRETCH = 3  # number of neighbouring lines whose mean must exceed it
@@ -40,7 +40,7 @@ def response_figure(
     kept = thinned(frequency, np.abs(response), MOST)
     kept = kept[frequency[kept] > 0]
     frequency, coherence, response, sigma = frequency[kept], coherence[kept], response[kept], table["sigma"][kept]
-    trusted = coherence >= LEAST
+    trusted = coherence >= LEAST_COHERENCE
     usable = trusted if bool(trusted.any()) else ~trusted
     figure = rows(4, shared=True, gap=0.04, heights=[0.24, 0.36, 0.24, 0.16])
     part = Z95 * np.where(np.isfinite(sigma), sigma, 0.0) / np.sqrt(2) / np.maximum(np.abs(response), 1e-300)

@@ -22,7 +22,7 @@ from xy_sysid.report.theme import FLOOR
 from xy_sysid.response.coupling import Coupling
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.recording import Recording, Run, one_run
-from xy_sysid.settings import IdentifierSettings
+from xy_sysid.settings import LEAST_COHERENCE
 
 COLOURS = ("#d1495b", "#2e8b57", "#7b5ea7", "#c77d0a", "#00798c")
 DASHES = ("dash", "solid", "dot", "dashdot", "longdash")
@@ -57,7 +57,7 @@ def bode(frf: FrequencyResponse, *others: FrequencyResponse | AnyModel) -> go.Fi
 
 def coherence(frf: FrequencyResponse) -> go.Figure:
     """Coherence of every line; lines that no fit uses are small crosses."""
-    return coherence_figure({frf.origin.axis or "measured": frf}, IdentifierSettings().min_coherence)
+    return coherence_figure({frf.origin.axis or "measured": frf}, LEAST_COHERENCE)
 
 
 def coupling(found: Coupling) -> go.Figure:

@@ -10,9 +10,8 @@ from xy_sysid.report.story_parts import SMALL, Document, drawing, grey, legend_n
 from xy_sysid.report.theme import FAILS, MEASURED, MODEL, fade
 from xy_sysid.report.words import number
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.settings import LEAST_COHERENCE
 from xy_sysid.units import over, readable
-
-LEAST = 0.3  # coherence of a trusted line
 
 
 def bode(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
@@ -77,7 +76,7 @@ def coherence(document: Document, step: int | None = None, mode: str = "light") 
         )
     if not bool(trusted.all()):
         figure.add_scatter(x=frequency[~trusted], y=values[~trusted], mode="markers", marker=grey(), name="not trusted", row=1, col=1)
-    figure.add_hline(y=LEAST, line={"color": FAILS, "width": 1, "dash": "dot"}, row=1, col=1)
+    figure.add_hline(y=LEAST_COHERENCE, line={"color": FAILS, "width": 1, "dash": "dot"}, row=1, col=1)
     figure.update_yaxes(title_text="coherence", range=[-0.03, 1.05], row=1, col=1)
     figure.update_layout(showlegend=not bool(trusted.all()))
     frequency_axis(figure, 1, [frequency])
