@@ -19,6 +19,7 @@ from xy_sysid.fitting.modes import pole_estimates
 from xy_sysid.fitting.result import POOR_ERROR, Fit
 from xy_sysid.fitting.structure import FitOptions, structure_from
 from xy_sysid.linear.transfer_function import LIGHT_DAMPING, TransferFunction
+from xy_sysid.live import status_values
 from xy_sysid.live.coupling_messages import coupling_messages, coupling_status
 from xy_sysid.live.identifier import AxisRequest, FitRequest
 from xy_sysid.live.messages import comparison_message, frf_message, transfer_function_message
@@ -180,27 +181,25 @@ def _status(axis: str, update: AxisUpdate, request: FitRequest) -> StatusMessage
     fit, track = update.fit, update.track
     values: dict[str, str] = {
         "fit": str(request.number),
-        "windows": str(update.windows),
+        status_values.WINDOWS: str(update.windows),
         "averages": f"{update.frf.averages:.6g}",
-        "seconds of data (s)": f"{request.seconds:.6g}",
-        "sampling rate (Hz)": f"{request.sampling_rate:.9g}",
-        "input unit": update.frf.input_unit,
-        "output unit": update.frf.output_unit,
-        "dropped windows": str(sum(update.dropped.values())),
+        status_values.SECONDS: f"{request.seconds:.6g}",
+        status_values.RATE: f"{request.sampling_rate:.9g}",
+        status_values.INPUT_UNIT: update.frf.input_unit,
+        status_values.OUTPUT_UNIT: update.frf.output_unit,
+        status_values.DROPPED: str(sum(update.dropped.values())),
     }
-    values |= {f"dropped windows: {reason}": str(number) for reason, number in sorted(update.dropped.items())}
+    values |= {f"{status_values.DROPPED_FOR}{reason}": str(number) for reason, number in sorted(update.dropped.items())}
     values |= {f"stream: {reason}": str(number) for reason, number in sorted(request.faults.items())}
     if fit is None:
         return StatusMessage(f"axis {axis}", WARN, f"axis {axis}: no fit yet: {update.problem}", tuple(values.items()))
-    values["relative error (1)"], values["misfit (1)"] = f"{fit.relative_error:.6g}", f"{fit.misfit:.6g}"
+    values[status_values.RELATIVE_ERROR], values["misfit (1)"] = f"{fit.relative_error:.6g}", f"{fit.misfit:.6g}"
     for item in fit.intervals:
         if item.name in ("delay", "gain") or "resonance" in item.name:
-            label = f"{item.name} ({item.unit or '1'})"
-            values[label] = f"{item.value:.9g}"
-            values[f"{item.name} 95 % low"], values[f"{item.name} 95 % high"] = f"{item.low:.9g}", f"{item.high:.9g}"
+            values |= status_values.written(item)
     values["cost"], values["expected cost"] = f"{fit.cost:.6g}", f"{fit.expected_cost:.6g}"
     if track.reference and track.now:
-        values["resonance watched (Hz)"], values["resonance reference (Hz)"] = f"{track.now.frequency:.6g}", f"{track.reference.frequency:.6g}"
+        values[status_values.WATCHED], values[status_values.REFERENCE] = f"{track.now.frequency:.6g}", f"{track.reference.frequency:.6g}"
         values["resonance shift (Hz)"] = f"{track.shift:.6g}"
     level, sentence = _verdict(axis, update, request)
     return StatusMessage(f"axis {axis}", level, sentence, tuple(values.items()))
