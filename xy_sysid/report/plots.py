@@ -16,7 +16,7 @@ from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.report import story_progress
 from xy_sysid.report.coupling import coupling_figure
 from xy_sysid.report.figures import coherence_figure, response_figure
-from xy_sysid.report.parts import decibel, phase_of, plain
+from xy_sysid.report.parts import aligned, decibel, phase_of, plain
 from xy_sysid.report.story_parts import drawing
 from xy_sysid.report.theme import FLOOR
 from xy_sysid.response.coupling import Coupling
@@ -44,8 +44,7 @@ def bode(frf: FrequencyResponse, *others: FrequencyResponse | AnyModel) -> go.Fi
     reference = phase_of(lines.response)
     for number, model in enumerate(models):
         response = through_window(model.tf, lines, model.hold if isinstance(model, LinearModel) else "zoh")
-        phase = phase_of(response)
-        phase = phase + 360 * np.round(np.median(reference - phase) / 360)
+        phase = aligned(phase_of(response), reference)
         name = plain(model.label)
         line = {"color": COLOURS[number % len(COLOURS)], "width": 1.8, "dash": DASHES[number % len(DASHES)]}
         for row, values in ((1, decibel(response, frf.output_unit)), (2, phase)):
