@@ -35,6 +35,8 @@ class Settings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
+LEAST_COHERENCE = 0.3  # of a trusted line, unless the user chooses another
+
 # what people type for a kind of signal
 ALSO = {"chirp": "sweep", "sine": "stepped_sine", "sines": "multisine", "random": "noise", "white": "noise", "binary": "prbs", "pulse": "impulse"}
 
@@ -227,7 +229,7 @@ class IdentifierSettings(StreamSettings):
     sliding: int = knob(0, "keep only this many of the newest windows; 0: keep all", "", ge=0, le=100_000)
     band_low: float = knob(0.5, "lowest frequency used in a fit", "Hz", ge=0.0, le=1e6)
     band_high: float = knob(300.0, "highest frequency used in a fit", "Hz", gt=0.0, le=1e6)
-    min_coherence: float = knob(0.3, "lines below this coherence are not trusted", "", ge=0.0, le=1.0)
+    min_coherence: float = knob(LEAST_COHERENCE, "lines below this coherence are not trusted", "", ge=0.0, le=1.0)
     numerator_order: int = knob(-1, "order of the transfer function's numerator; -1: see denominator_order", "", ge=-1, le=12)
     denominator_order: int = knob(
         0, "order of its denominator, integrators included; 0 with numerator_order -1: both are chosen from the data, else 4 and 2", "", ge=0, le=12

@@ -79,8 +79,8 @@ def bare_comparisons(path: Path) -> list[str]:
     found = []
     for item in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         called = ast.unparse(item.func).rsplit(".", 1)[-1] if isinstance(item, ast.Call) else ""
-        bounds = isinstance(item, ast.Call) and called in BOUNDS and "effects" not in path.parts  # an effect's start values have bounds
-        if isinstance(item, ast.Compare) or bounds:
+        bounds = called in BOUNDS and "effects" not in path.parts  # start values of an effect have bounds
+        if isinstance(item, ast.Compare) or (isinstance(item, ast.Call) and bounds):
             values = [node.value for node in ast.walk(item) if isinstance(node, ast.Constant)]
             numbers = [value for value in values if isinstance(value, int | float) and value not in PLAIN and value > GUARD]
             found += [f"line {item.lineno}: {number:g}" for number in numbers]

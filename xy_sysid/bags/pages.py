@@ -9,13 +9,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.bags.cdr import Bytes
 from xy_sysid.bags.stride import Indices
-from xy_sysid.jit import compiled
+from xy_sysid.jit import compiled, inlined
 
 INTERIOR, LEAF = 5, 13
 SPAN = 1 << 20  # bytes read at once: stays in the cache of the processor
@@ -34,6 +35,29 @@ class PageFile:
     size: int
     usable: int
     pages: int
+
+
+class Span(NamedTuple):
+    """Pages ``first``, ``first + 1``, ... at the beginning of a buffer, up to byte ``filled``; size, usable: as in ``PageFile``."""
+
+    first: int
+    filled: int
+    size: int
+    usable: int
+
+
+class Cell(NamedTuple):
+    """One message. body, length: where its data begin in the buffer, and their bytes; here: how many of them are on the leaf page."""
+
+    row_id: int
+    topic: int
+    time: int
+    body: int
+    length: int
+    here: int
+
+
+DAMAGED = Cell(row_id=0, topic=-1, time=0, body=0, length=-1, here=-1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,117 +120,124 @@ def leaves(file: PageFile, root: int) -> Iterator[NDArray[np.int64]]:
 
 
 @compiled
-def varint(data: Bytes, at: int) -> tuple[np.int64, int]:
+def varint(data: Bytes, at: int) -> tuple[int, int]:
     """Value, and the offset after it; ``data`` must have 9 bytes from ``at``."""
     value = np.int64(0)
     for index in range(8):
         byte = np.int64(data[at + index])
         value = (value << 7) | (byte & 127)
         if byte < 128:
-            return value, at + index + 1
-    return (value << 8) | np.int64(data[at + 8]), at + 9
+            return int(value), at + index + 1
+    return int((value << 8) | np.int64(data[at + 8])), at + 9
 
 
 @compiled
-def integer(data: Bytes, at: int, kind: int) -> np.int64:
+def integer(data: Bytes, at: int, kind: int) -> int:
     """Value of an integer column of serial type ``kind``."""
     if kind == 0 or kind == 8:
-        return np.int64(0)
+        return 0
     if kind == 9:
-        return np.int64(1)
+        return 1
     value = np.int64(np.int8(data[at]))
     for index in range(1, WIDTHS[kind]):
         value = (value << 8) | np.int64(data[at + index])
-    return value
+    return int(value)
+
+
+@inlined
+def big_endian(data: Bytes, at: int, width: int) -> int:
+    """Value of an unsigned number of ``width`` bytes."""
+    value = np.int64(0)
+    for index in range(width):
+        value = (value << 8) | np.int64(data[at + index])
+    return int(value)
+
+
+@inlined
+def _on_leaf(payload: int, usable: int) -> int:
+    """How many bytes of a row are on its leaf page; the others are on overflow pages."""
+    if payload <= usable - 35:
+        return payload
+    least = (usable - 12) * 32 // 255 - 23
+    local = least + (payload - least) % (usable - 4)
+    return local if local <= usable - 35 else least
+
+
+@inlined
+def _cell(buffer: Bytes, at: int, end: int, usable: int) -> Cell:
+    """The message whose row begins at ``at``, on a page up to ``end``; DAMAGED if it is no message.
+
+    A damaged row may extend beyond its page, but never beyond the free space behind the pages.
+    """
+    if at >= end:
+        return DAMAGED
+    payload, at = varint(buffer, at)
+    row_id, record = varint(buffer, at)
+    local = _on_leaf(payload, usable)
+    if payload < 5 or record + local + (4 if local < payload else 0) > end:
+        return DAMAGED
+    header, at = varint(buffer, record)
+    id_kind, topic_kind, time_kind = buffer[at], buffer[at + 1], buffer[at + 2]
+    data_kind, at = varint(buffer, at + 3)
+    if id_kind != 0 or topic_kind > 9 or time_kind > 9 or data_kind < 12 or data_kind % 2 or at != record + header:
+        return DAMAGED
+    time = at + int(WIDTHS[topic_kind])
+    body = time + int(WIDTHS[time_kind])
+    length = (data_kind - 12) // 2
+    if body - record + length != payload or body - record > local:
+        return DAMAGED
+    return Cell(row_id, integer(buffer, at, topic_kind), integer(buffer, time, time_kind), body, length, record + local - body)
 
 
 @compiled
-def leaf_cells(
-    buffer: Bytes, first: int, filled: int, numbers: Indices, size: int, usable: int, spill: int, topics: Indices, rows: Indices
-) -> tuple[int, int, int]:
+def _gathered(buffer: Bytes, span: Span, cell: Cell, spill: int) -> bool:
+    """Copy the data of a message from its leaf and overflow pages to ``spill``; False if one of the pages is not in the buffer."""
+    buffer[spill : spill + cell.here] = buffer[cell.body : cell.body + cell.here]
+    done, link = cell.here, cell.body + cell.here
+    while done < cell.length:
+        link = (big_endian(buffer, link, 4) - span.first) * span.size
+        if link < 0 or link + span.size > span.filled:
+            return False
+        part = min(span.usable - 4, cell.length - done)
+        buffer[spill + done : spill + done + part] = buffer[link + 4 : link + 4 + part]
+        done += part
+    return True
+
+
+@compiled
+def leaf_cells(buffer: Bytes, span: Span, numbers: Indices, topics: Indices, rows: Indices) -> tuple[int, int, int]:
     """Find the messages (id, topic_id, timestamp, data) of some leaf pages.
 
-    buffer:  pages ``first``, ``first + 1``, ... up to byte ``filled``, then free space from ``spill`` for data of overflow pages
+    buffer:  the pages of ``span``, then free space for data of overflow pages
     numbers: the leaf pages to read
     topics:  index of the topic by topic id, -1 for unwanted ones; ids after the last are unwanted
     rows:    output, one per wanted message: row id, topic, log time, start in buffer (-1: its pages are not in the buffer), length
     Returns the number of messages (-1: a larger ``rows`` or buffer is needed), of damaged pages, and the end of the overflow data.
     """
-    found, damaged = 0, 0
+    found, damaged, spill = 0, 0, span.filled
     for number in numbers:
-        base = (number - first) * size
-        if base < 0 or base + size > filled or buffer[base] != 13:
+        base = (number - span.first) * span.size
+        if base < 0 or base + span.size > span.filled or buffer[base] != LEAF or 8 + 2 * big_endian(buffer, base + 3, 2) > span.usable:
             damaged += 1
             continue
-        count = np.int64(buffer[base + 3]) << 8 | np.int64(buffer[base + 4])
-        if 8 + 2 * count > usable:
-            damaged += 1
-            continue
-        end = base + usable
         broken = False
-        for cell in range(count):
-            pointer = base + 8 + 2 * cell
-            at = base + (np.int64(buffer[pointer]) << 8 | np.int64(buffer[pointer + 1]))
-            if at >= end:
+        for pointer in range(base + 8, base + 8 + 2 * big_endian(buffer, base + 3, 2), 2):
+            cell = _cell(buffer, base + big_endian(buffer, pointer, 2), base + span.usable, span.usable)
+            if cell.length < 0:
                 broken = True
+            if cell.topic < 0 or cell.topic >= topics.shape[0] or topics[cell.topic] < 0:
                 continue
-            # A damaged cell may extend beyond its page, but never beyond the free space behind the pages.
-            payload, at = varint(buffer, at)
-            row_id, at = varint(buffer, at)
-            local = payload
-            if payload > usable - 35:
-                least = (usable - 12) * 32 // 255 - 23
-                local = np.int64(least + (payload - least) % (usable - 4))
-                if local > usable - 35:
-                    local = np.int64(least)
-            if payload < 5 or at + local + (4 if local < payload else 0) > end:
-                broken = True
-                continue
-            record = at
-            header, at = varint(buffer, at)
-            id_kind, topic_kind, time_kind = buffer[at], buffer[at + 1], buffer[at + 2]
-            data_kind, at = varint(buffer, at + 3)
-            if id_kind != 0 or topic_kind > 9 or time_kind > 9 or data_kind < 12 or data_kind % 2 or at != record + header:
-                broken = True
-                continue
-            topic = integer(buffer, at, topic_kind)
-            at += WIDTHS[topic_kind]
-            time = integer(buffer, at, time_kind)
-            body = at + WIDTHS[time_kind]
-            length = (data_kind - 12) // 2
-            if body - record + length != payload or body - record > local:
-                broken = True
-                continue
-            if topic < 0 or topic >= topics.shape[0] or topics[topic] < 0:
-                continue
-            if found >= rows.shape[0]:
-                return -1, damaged, spill
-            rows[found, 0], rows[found, 1], rows[found, 2], rows[found, 4] = row_id, topics[topic], time, length
-            rows[found, 3] = body
-            if local < payload:
-                here = record + local - body
-                if spill + length > buffer.shape[0]:
-                    return -1, damaged, spill + int(length)
-                buffer[spill : spill + here] = buffer[body : body + here]
-                done, link = here, np.int64(record + local)
-                reachable = True
-                while done < length:
-                    chained = (
-                        np.int64(buffer[link]) << 24 | np.int64(buffer[link + 1]) << 16 | np.int64(buffer[link + 2]) << 8 | np.int64(buffer[link + 3])
-                    )
-                    link = (chained - first) * size
-                    if link < 0 or link + size > filled:
-                        reachable = False
-                        break
-                    part = min(usable - 4, length - done)
-                    buffer[spill + done : spill + done + part] = buffer[link + 4 : link + 4 + part]
-                    done += part
-                rows[found, 3] = spill if reachable else -1
-                if reachable:
-                    spill += int(length)
-            found += 1
-        if broken:
-            damaged += 1
+            start, end = cell.body, spill
+            if cell.here < cell.length:
+                start, end = spill, spill + cell.length
+            if found >= rows.shape[0] or end > buffer.shape[0]:
+                return -1, damaged, end
+            if end > spill and not _gathered(buffer, span, cell, spill):
+                start, end = -1, spill
+            rows[found, 0], rows[found, 1], rows[found, 2] = cell.row_id, topics[cell.topic], cell.time
+            rows[found, 3], rows[found, 4] = start, cell.length
+            found, spill = found + 1, end
+        damaged += broken
     return found, damaged, spill
 
 
@@ -234,7 +265,7 @@ def scan(file: PageFile, root: int, topics: Indices) -> Iterator[Cells]:
                 buffer = np.empty(2 * max(span, SPAN), np.uint8)
             filled = os.preadv(file.handle, [buffer[:span].data], (low - 1) * file.size)
             while True:
-                found, damaged, spill = leaf_cells(buffer, low, filled, numbers[at:end], file.size, file.usable, filled, topics, rows)
+                found, damaged, spill = leaf_cells(buffer, Span(low, filled, file.size, file.usable), numbers[at:end], topics, rows)
                 if found >= 0:
                     break
                 if spill > buffer.size:

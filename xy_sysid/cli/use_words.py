@@ -22,9 +22,18 @@ TURN = 2.0 * math.pi  # rad
 
 def show(name: str, used: Used) -> None:
     """Print every result of an axis."""
-    units = used.model.units
     for note in used.notes:
         say(f"axis {name}: {note}", aside)
+    for part in (_show_gains, _show_feedback, _show_states, _show_modes, _show_corrections, _show_limits, _show_tracking):
+        part(name, used)
+    for effect, why in used.not_undone:
+        say(f"  The feedforward does not compensate {effect}: {why}.")
+    for what, why in used.refused:
+        say(f"  No {what}: {why}")
+    say()
+
+
+def _show_gains(name: str, used: Used) -> None:
     doubtful = {item.name: item.doubt for item in used.gains.items if used.model.parameters and item.doubt}
     shown = [
         (
@@ -37,35 +46,49 @@ def show(name: str, used: Used) -> None:
     most = ", ".join(f"{item.name} {item.because[0][0]}" for item in used.gains.items if item.because)
     if most:
         say(f"  The parameter that contributes most to each interval: {most}.")
-    if used.feedback is not None:
-        _show_feedback(name, used, used.feedback)
-    if used.states is not None:
-        s = used.states
+
+
+def _show_states(_: str, used: Used) -> None:
+    s, units = used.states, used.model.units
+    if s is not None:
         say(
             f"  State feedback with an observer (--to state_feedback): bandwidth {s.bandwidth / TURN:.3g} Hz, {s.b.size} states. Worst of {s.count} "
             f"samples: phase margin {s.worst.phase:.3g} degrees, gain margin {s.worst.gain:.3g}. A load of 1 {units.input} moves it by "
             f"{moved(s.rejects, units.output)} at most, and a tenth of that is left after {1e3 * s.settles:.3g} ms."
         )
+
+
+def _show_modes(name: str, used: Used) -> None:
     for mode in used.modes:
         say(f"  {_mode(mode)}")
-    if used.shaper is not None:
-        rows = []
-        for one in used.shapers:
-            vibration = (f"{100 * share:.2g}" for share in (one.vibration, one.worst))
-            rows.append((f"{one.name}{' (best)' if one is used.shaper else ''}", f"{1e3 * one.duration:.3g}", *vibration))
-        title = f"axis {name}: input shapers at {used.shaper.frequency:.2f} Hz, damping {used.shaper.damping:.3g}"
-        table(title, ("shaper", "ms longer", "vibration left, %", "at worst over the interval, %"), rows)
-        if used.rings is not None:
-            before, after = (moved(value, units.output) for value in used.rings)
-            say(f"  After the fastest S-curve below the load swings by {before}; with the {used.shaper.name} shaper by {after}.")
+    if used.shaper is None:
+        return
+    rows = []
+    for one in used.shapers:
+        vibration = (f"{100 * share:.2g}" for share in (one.vibration, one.worst))
+        rows.append((f"{one.name}{' (best)' if one is used.shaper else ''}", f"{1e3 * one.duration:.3g}", *vibration))
+    title = f"axis {name}: input shapers at {used.shaper.frequency:.2f} Hz, damping {used.shaper.damping:.3g}"
+    table(title, ("shaper", "ms longer", "vibration left, %", "at worst over the interval, %"), rows)
+    if used.rings is not None:
+        before, after = (moved(value, used.model.units.output) for value in used.rings)
+        say(f"  After the fastest S-curve below the load swings by {before}; with the {used.shaper.name} shaper by {after}.")
+
+
+def _show_corrections(_: str, used: Used) -> None:
+    output = used.model.units.output
     for item in (*used.tables, *([used.friction] if used.friction is not None else [])):
         say(f"  Table {item.name}: {item.before:.3g} {item.unit} rms, known to {item.after:.2g}; {item.meaning}.")
     if used.gap is not None:
-        low, high = bare(used.gap.low, units.output, 4), moved(used.gap.high, units.output, 4)
+        low, high = bare(used.gap.low, output, 4), moved(used.gap.high, output, 4)
         closed = {effect for effect, _ in used.not_undone}
         left = any(effect in closed for one in used.tracking for effect, _ in one.left)
         useless = "; with the feedback above this is predicted not to help along the paths below" if left else ""
-        say(f"  Backlash {moved(used.gap.value, units.output, 4)} ({low} .. {high}): {used.gap.meaning}{useless}.")
+        say(f"  Backlash {moved(used.gap.value, output, 4)} ({low} .. {high}): {used.gap.meaning}{useless}.")
+
+
+def _show_limits(_: str, used: Used) -> None:
+    """Print the fastest path, and how much of the recorded input is predicted."""
+    units = used.model.units
     if used.fastest is not None:
         f = used.fastest
         scale, unit = motion(units.output)
@@ -80,6 +103,10 @@ def show(name: str, used: Used) -> None:
             f"  The recorded input below {p.below:.3g} Hz, predicted from the recorded motion, is off by {off[0]} with kV and kA alone, "
             f"{off[1]} with kS, {off[2]} with the whole feedforward{tabled}."
         )
+
+
+def _show_tracking(name: str, used: Used) -> None:
+    units = used.model.units
     for way in used.tracking:
         errors = [("PID", *(bare(value, units.output) for value in (way.feedback, way.simple, way.compensated, way.worst)), f"{way.largest:.3g}")]
         for other in way.loops:
@@ -89,16 +116,13 @@ def show(name: str, used: Used) -> None:
         table(title, ("feedback", "alone", "+ kS kV kA", "compensated", "worst", f"largest {units.input}"), errors)
     if used.tracking:
         say(f"  {_compensation(used.tracking[0])}")
-    for effect, why in used.not_undone:
-        say(f"  The feedforward does not compensate {effect}: {why}.")
-    for what, why in used.refused:
-        say(f"  No {what}: {why}")
-    say()
 
 
-def _show_feedback(name: str, used: Used, loop: Feedback) -> None:
+def _show_feedback(name: str, used: Used) -> None:
     """Print gains, with a filter in the loop if it allows a higher bandwidth; margins, encoder noise, and further limits."""
-    units = used.model.units
+    loop, units = used.feedback, used.model.units
+    if loop is None:
+        return
     loops = [loop, *([used.filtered] if used.filtered is not None else [])]
     rows: list[tuple[str, Callable[[Feedback], str], str]] = [
         ("crossover", lambda item: f"{item.nominal.crossover:.3g}", "Hz"),

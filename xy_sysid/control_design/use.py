@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -21,7 +22,7 @@ from xy_sysid.control_design.inverse import not_undone
 from xy_sysid.control_design.laws import largest_voltage
 from xy_sysid.control_design.limits import Fastest, fastest
 from xy_sysid.control_design.measured_table import measured_table
-from xy_sysid.control_design.path import Bounds, recorded, s_curve
+from xy_sysid.control_design.path import Bounds, SampledPath, recorded, s_curve
 from xy_sysid.control_design.state_feedback import StateFeedback, state_feedback
 from xy_sysid.control_design.tables import Correction, friction_table, position_tables
 from xy_sysid.control_design.uncertain import Derived, derive, later, samples
@@ -119,6 +120,110 @@ def use(
     calculation: periods of the controller from reading the encoder to writing the voltage, in margins and simulations (1: written in the next cycle)
     Raises BadInput for a transfer function, or values out of range. Designs that miss the margins are in ``refused``.
     """
+    task = _task(model, data, rate, limit, travel, calculation)
+    model, run, placed, refused = task.model, task.run, task.placed, list[tuple[str, str]]()
+    asked = Asked(*(margins or (PHASE_MARGIN, GAIN_MARGIN)), bandwidth)
+    found = gains(model)
+    loop = _tried("feedback", lambda: feedback(_placed(task.late, task.sensed), task.rate, asked, encoder=task.encoder, limit=task.limit), refused)
+    swings = _tried("filters", lambda: modes(model), refused) or ()
+    table = None if placed is None else _tried("measured table", lambda: measured_table(model, placed, WIDER * clear_below(model, placed)), refused)
+    every = shapers(swings[0]) if swings else ()
+    shaper = best_shaper(every) if every else None
+    better = None if loop is None or bandwidth is not None else with_filter(task.late, task.rate, swings, loop, task.encoder, task.limit)
+    quick = _fastest(task, refused)
+    states = _tried("state feedback", lambda: state_feedback(_placed(task.soon, task.sensed), task.rate, asked), refused)
+    followed: list[tuple[Tracking, Compensation]] = []
+    if loop is not None:
+        others = [] if better is None else [(f"with the {better[0].kind}", better[1].controller)]
+        others += [("state feedback", states.controller(task.limit))] if states is not None and calculation >= 1.0 else []
+        slow = samples(task.late, WORST_OF)
+        followed = [tracked(slow, found, loop.controller, path, task.encoder, others) for path in _paths(task, loop, quick)]
+    return Used(
+        axis=model.axis or (run.axis if run is not None else "x"),
+        model=model,
+        sampling_rate=task.rate,
+        rate_from=task.rate_from,
+        calculation=calculation,
+        limit=task.limit if task.limit < NO_LIMIT else math.inf,
+        limit_from=task.limit_from,
+        travel=task.travel,
+        gains=found,
+        friction=friction_table(model, max(0.5 * min(task.limit, 4.0) * abs(model.model.gain), 1e-12)),
+        tables=(*(() if task.travel is None else position_tables(model, task.travel)), *([] if table is None else [table.correction(model)])),
+        gap=_gap(model),
+        feedback=loop,
+        states=states,
+        modes=swings,
+        notch=_tried("notch", lambda: notch(swings[0], task.rate), refused) if swings and loop is not None else None,
+        allowed=None
+        if loop is None
+        else _tried("bandwidth", lambda: bandwidth_of(model, task.rate, loop.nominal.crossover, asked, task.wait), refused),
+        filter=None if better is None else better[0],
+        filtered=None if better is None else better[1],
+        shapers=every,
+        shaper=shaper,
+        rings=None if quick is None or shaper is None else (rings_after(quick.path, swings[0]), rings_after(shaper.shape(quick.path), swings[0])),
+        fastest=quick,
+        predicted=None if run is None else _tried("prediction", lambda: predicted(model, found, run, table), refused),
+        tracking=tuple(item for item, _ in followed),
+        compensation=followed[0][1] if followed else None,
+        refused=tuple(refused),
+        not_undone=not_undone(model.model),
+        notes=_notes(model, run, found),
+    )
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is designed for: the model, a recording of its machine, the controller and the drive; see ``use`` and ``Used``."""
+
+    model: PhysicalModel
+    run: Run | None
+    rate: float
+    rate_from: str
+    limit: float
+    limit_from: str
+    travel: tuple[float, float] | None
+    wait: float
+
+    @property
+    def late(self) -> PhysicalModel:
+        """The model with the delay of the calculation."""
+        return later(self.model, self.wait)
+
+    @property
+    def soon(self) -> PhysicalModel:
+        """The model for the design of the state feedback, of which a period of calculation is part."""
+        return later(self.model, max(self.wait - 1.0 / self.rate, 0.0))
+
+    @property
+    def sensed(self) -> Sensed:
+        """The measured quantity."""
+        return self.model.units.sensed if self.run is None else self.run.measured
+
+    @property
+    def placed(self) -> Run | None:
+        """The recording, if it has a position; the integral of a speed drifts, so it is no position."""
+        return self.run if self.sensed == "position" else None
+
+    @cached_property
+    def encoder(self) -> Encoder:
+        """The encoder of the recording."""
+        return Encoder() if self.placed is None else encoder_of(self.placed)
+
+    @property
+    def ends(self) -> list[float]:
+        """m, where the paths over the travel stop; empty if the travel is unknown."""
+        if self.travel is None:
+            return []
+        low, high = self.travel
+        return [0.5 * (low + high), high, low, 0.5 * (low + high)]
+
+
+def _task(
+    model: AnyModel, data: Run | Recording | None, rate: float | None, limit: float | None, travel: tuple[float, float] | None, calculation: float
+) -> _Task:
+    """The task, with what was not given taken from the recording or the model. Raises BadInput for values out of range."""
     if not isinstance(model, PhysicalModel):
         raise BadInput("model", type(model).__name__, "a model with physical effects", "Make one with refine, or xy-sysid refine --model.")
     run = None if data is None else one_run(data)
@@ -129,83 +234,36 @@ def use(
         raise BadInput("rate", f"{rate:g} Hz", "1 to 1e6 Hz", "Give the controller's rate.")
     if not 0.0 <= calculation <= LONGEST_CALCULATION:
         raise BadInput("calculation", f"{calculation:g} periods", f"0 to {LONGEST_CALCULATION:g}", "Give the periods from reading to writing.")
-    wait = calculation / rate
-    late = later(model, wait)
     drive, drive_from = _limit(model, run, limit)
-    sensed = model.units.sensed if run is None else run.measured
-    placed = run if sensed == "position" else None  # the integral of a speed drifts, so it is no position
-    between = travel or (None if placed is None else (float(np.min(placed.position)), float(np.max(placed.position))))
-    if between is not None and not between[0] < between[1]:
-        raise BadInput("travel", f"{between[0]:g} to {between[1]:g}", "two places, the lower first", "Give --travel LOW HIGH.")
-    encoder = Encoder() if placed is None else encoder_of(placed)
-    refused: list[tuple[str, str]] = []
-    found = gains(model)
-    asked = Asked(*(margins or (PHASE_MARGIN, GAIN_MARGIN)), bandwidth)
-    loop = _tried("feedback", lambda: feedback(_placed(late, sensed), rate, asked, encoder=encoder, limit=drive), refused)
-    swings = _tried("filters", lambda: modes(model), refused) or ()
-    table = None if placed is None else _tried("measured table", lambda: measured_table(model, placed, WIDER * clear_below(model, placed)), refused)
-    every = shapers(swings[0]) if swings else ()
-    better = None if loop is None or bandwidth is not None else with_filter(late, rate, swings, loop, encoder, drive)
-    models = _tried("worst cases", lambda: samples(model, WORST_OF), refused) or (model.model,)
-    quick, ends = None, []
-    if between is None:
+    task = _Task(model=model, run=run, rate=rate, rate_from=rate_from, limit=drive, limit_from=drive_from, travel=travel, wait=calculation / rate)
+    if not travel and task.placed is not None:
+        task = replace(task, travel=(float(np.min(task.placed.position)), float(np.max(task.placed.position))))
+    if task.travel is not None and not task.travel[0] < task.travel[1]:
+        raise BadInput("travel", f"{task.travel[0]:g} to {task.travel[1]:g}", "two places, the lower first", "Give --travel LOW HIGH.")
+    return task
+
+
+def _fastest(task: _Task, refused: list[tuple[str, str]]) -> Fastest | None:
+    """The fastest path over the travel."""
+    models = _tried("worst cases", lambda: samples(task.model, WORST_OF), refused) or (task.model.model,)
+    if task.travel is None:
         refused.append(("path and tables by position", "the travel is not known: give a recording of the position with --on, or --travel LOW HIGH."))
-    else:
-        centre = 0.5 * (between[0] + between[1])
-        ends = [centre, between[1], between[0], centre]
-    if ends and drive < NO_LIMIT:
-        quick = _tried("fastest path", lambda: fastest(models, ends, drive, rate), refused)
-    soon = later(model, max(wait - 1.0 / rate, 0.0))  # a period of calculation is part of the design of the state feedback
-    states = _tried("state feedback", lambda: state_feedback(_placed(soon, sensed), rate, asked), refused)
-    shaper = best_shaper(every) if every else None
-    rings = None
-    if quick is not None and shaper is not None:
-        rings = rings_after(quick.path, swings[0]), rings_after(shaper.shape(quick.path), swings[0])
-    followed: list[tuple[Tracking, Compensation]] = []
-    if loop is not None:
-        paths = []
-        if quick is not None:
-            calm = Bounds(CALM * quick.bounds.speed, CALM**2 * quick.bounds.acceleration, CALM**3 * quick.bounds.jerk)
-            paths.append(("S-curve over the travel", s_curve(ends, calm, rate)))
-        if run is not None and run.sampling_rate == rate:
-            edge = max(int(EDGE * len(run)), 1)  # the low-pass distorts both ends
-            whole = recorded(run.position, rate, FOLLOWED * loop.bandwidth)
-            paths.append(("the recorded motion", whole.part(edge, min(len(run) - edge, edge + round(LONGEST * rate)))))
-        slow = samples(late, WORST_OF)
-        others = [] if better is None else [(f"with the {better[0].kind}", better[1].controller)]
-        others += [("state feedback", states.controller(drive))] if states is not None and calculation >= 1.0 else []
-        followed = [tracked(slow, found, loop.controller, path, encoder, others) for path in paths]
-    return Used(
-        axis=model.axis or (run.axis if run is not None else "x"),
-        model=model,
-        sampling_rate=rate,
-        rate_from=rate_from,
-        calculation=calculation,
-        limit=drive if drive < NO_LIMIT else math.inf,
-        limit_from=drive_from,
-        travel=between,
-        gains=found,
-        friction=friction_table(model, max(0.5 * min(drive, 4.0) * abs(model.model.gain), 1e-12)),
-        tables=(*(() if between is None else position_tables(model, between)), *([] if table is None else [table.correction(model)])),
-        gap=_gap(model),
-        feedback=loop,
-        states=states,
-        modes=swings,
-        notch=_tried("notch", lambda: notch(swings[0], rate), refused) if swings and loop is not None else None,
-        allowed=None if loop is None else _tried("bandwidth", lambda: bandwidth_of(model, rate, loop.nominal.crossover, asked, wait), refused),
-        filter=None if better is None else better[0],
-        filtered=None if better is None else better[1],
-        shapers=every,
-        shaper=shaper,
-        rings=rings,
-        fastest=quick,
-        predicted=None if run is None else _tried("prediction", lambda: predicted(model, found, run, table), refused),
-        tracking=tuple(item for item, _ in followed),
-        compensation=followed[0][1] if followed else None,
-        refused=tuple(refused),
-        not_undone=not_undone(model.model),
-        notes=_notes(model, run, found),
-    )
+    if task.travel is None or not task.limit < NO_LIMIT:
+        return None
+    return _tried("fastest path", lambda: fastest(models, task.ends, task.limit, task.rate), refused)
+
+
+def _paths(task: _Task, loop: Feedback, quick: Fastest | None) -> list[tuple[str, SampledPath]]:
+    """The paths on which tracking is compared, with their names."""
+    paths: list[tuple[str, SampledPath]] = []
+    if quick is not None:
+        calm = Bounds(CALM * quick.bounds.speed, CALM**2 * quick.bounds.acceleration, CALM**3 * quick.bounds.jerk)
+        paths.append(("S-curve over the travel", s_curve(task.ends, calm, task.rate)))
+    if task.run is not None and task.run.sampling_rate == task.rate:
+        edge = max(int(EDGE * len(task.run)), 1)  # the low-pass distorts both ends
+        whole = recorded(task.run.position, task.rate, FOLLOWED * loop.bandwidth)
+        paths.append(("the recorded motion", whole.part(edge, min(len(task.run) - edge, edge + round(LONGEST * task.rate)))))
+    return paths
 
 
 def _tried(what: str, make: Callable[[], Found], refused: list[tuple[str, str]]) -> Found | None:

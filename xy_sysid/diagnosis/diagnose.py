@@ -118,10 +118,11 @@ def _named(data: AxisData, found: Answer) -> tuple[Answer, float]:
     def worth_naming(rung: Rung) -> float:
         return _confidence(data, found, rung.fit) * math.log(found.base.held_out_error / max(rung.held_out_error, 1e-300))
 
-    most = max(found.rungs[1:], key=worth_naming, default=None)
-    if most is None or most is found.rungs[-1]:
+    last = len(found.rungs) - 1
+    most = max(range(1, last + 1), key=lambda place: worth_naming(found.rungs[place]), default=last)
+    if most == last:
         return found, _confidence(data, found, found.final)
-    return _cut_after(data, found, found.rungs.index(most)), _confidence(data, found, most.fit)
+    return _cut_after(data, found, most), _confidence(data, found, found.rungs[most].fit)
 
 
 def _could_be(untried: tuple[str, ...], names: tuple[str, ...], library: Library) -> bool:

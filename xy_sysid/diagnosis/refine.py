@@ -107,7 +107,7 @@ def _of_longest(data: AxisData, found: Answer, library: Library, effort: Effort,
         alone = one_stretch(data, place)
     except BadInput:
         return replace(found, untried=names)
-    if alone.held_out is alone.fitted or not enough(np.arange(alone.velocity.size) >= alone.training):
+    if not alone.holds_out or not enough(np.arange(alone.velocity.size) >= alone.training):
         return replace(found, untried=names)
     rungs, until = rungs_of(alone, library), effort.now() + effort.budget
     pool = Pool(alone, library, most=effort.most, late=lambda: effort.now() > until)

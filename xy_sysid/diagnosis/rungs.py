@@ -79,23 +79,10 @@ def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: OneStepResul
     if filtered is not None:
         return _of_one_step(pool, given[0], filtered, tried, refused)
     final = joined(data, node.fit, pool.late)
-    own = {name: pool.without(node, name) for name in sorted(node.effects - pool.kept)}
-    names = tuple(name for name, _ in final.model.effects)
-    parts = {name: [own[part] for part in _parts(library, name) if part in own] for name in names}
-    ordered = _ordered(library, {name: max((force for _, force in each), default=0.0) for name, each in parts.items()})
+    sizes = _sizes(pool, node, final)
+    ordered = _ordered(library, {name: max((force for _, force in each), default=0.0) for name, each in sizes.items()})
     ordered = (*kept, *(name for name in ordered if name not in kept))
-    others = [
-        item
-        for item in pool.nodes.values()
-        if item is not node and 0 < len(item.effects) <= len(node.effects) and not item.effects < node.effects
-        if not contains(library, item.effects, node.effects)
-        if not is_the_same(library, (item.effects, item.fit), (node.effects, node.fit), AT_FLOOR)
-        if not item.refused or is_mistaken_for(library, item.effects, node.effects)  # it is no spring, but is it a wave?
-    ]
-    others.sort(key=lambda item: (-_doubt(node, item), item.screening.excess))
-    for item in others[:1]:
-        pool.with_full_fit(item, shown=True)
-    rivals = tuple(_tried(pool, base, item, _doubt(node, item)) for item in others)
+    rivals = tuple(_tried(pool, base, item, _doubt(node, item)) for item in _rivals(pool, node))
     whole = [item for item in pool.nodes.values() if item.has_full_fit and not item.refused]
     rungs = (*given, *_rungs(pool, given, ordered, final))
     found = Answer(
@@ -104,7 +91,7 @@ def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: OneStepResul
         settled=None if rungs[-1].fit is final else Rung.of(final),
         candidates=tuple(tried),
         rivals=rivals,
-        sizes={name: min(size for size, _ in each) for name, each in parts.items() if each},
+        sizes={name: min(size for size, _ in each) for name, each in sizes.items() if each},
         helps=max((part_explained(data, base, item.fit) for item in whole), default=0.0),
         kept_out=_kept_out(pool, base, node),
         refused=refused,
@@ -115,6 +102,30 @@ def answer_of_search(pool: Pool, given: tuple[Rung, ...], filtered: OneStepResul
         units=data.units,
     )
     return likely_names(found, kept)
+
+
+def _sizes(pool: Pool, node: Node, final: GreyboxFit) -> dict[str, list[tuple[float, float]]]:
+    """(size, force) of each part of each effect of the final fit."""
+    own = {name: pool.without(node, name) for name in sorted(node.effects - pool.kept)}
+    return {name: [own[part] for part in _parts(pool.library, name) if part in own] for name, _ in final.model.effects}
+
+
+def _rivals(pool: Pool, node: Node) -> list[Node]:
+    """The sets that may be meant instead of the best one, the most likely first."""
+    others = [item for item in pool.nodes.values() if item is not node and _is_rival(pool.library, item, node)]
+    others.sort(key=lambda item: (-_doubt(node, item), item.screening.excess))
+    for item in others[:1]:
+        pool.with_full_fit(item, shown=True)
+    return others
+
+
+def _is_rival(library: Library, other: Node, node: Node) -> bool:
+    """True for a set of at most as many effects that is neither part of the best set nor the same law."""
+    if not 0 < len(other.effects) <= len(node.effects) or other.effects < node.effects or contains(library, other.effects, node.effects):
+        return False
+    if is_the_same(library, (other.effects, other.fit), (node.effects, node.fit), AT_FLOOR):
+        return False
+    return not other.refused or is_mistaken_for(library, other.effects, node.effects)  # it is no spring, but is it a wave?
 
 
 def _tried(pool: Pool, base: GreyboxFit, node: Node, doubt: float = 0.0) -> Tried:

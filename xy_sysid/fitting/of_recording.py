@@ -17,7 +17,7 @@ from xy_sysid.response.best_linear import Realisation, best_linear
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.response.friction_hint import friction_hint, friction_note
 from xy_sysid.response.h1 import H1Options
-from xy_sysid.response.methods import METHODS
+from xy_sysid.response.methods import METHODS, ResponseMethod
 from xy_sysid.response.period import FEWEST, find_half_period, find_period, half_periods, one_more, period_note
 from xy_sysid.response.window_check import stretches
 from xy_sysid.response.windows import WindowShape
@@ -67,45 +67,22 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
     Windows in which the encoder stands still or jumps are left out, as online, and a note says so.
     Raises BadInput if the axis is missing, was not excited, or the data are too short for one window.
     """
-    u, y = recording.axis(axis)
-    method = METHODS[settings.response]
-    r = _reference(recording, axis) if method.reference else None
-    repeats = u if r is None else r
-    _moving(axis, u, y, (recording.units.input, recording.units.measured))
-    runs = recording.runs()
-    integrated = recording.measured != "position"
-    if integrated:
+    method, notes = METHODS[settings.response], list[str]()
+    heard = _heard(recording, axis, method)
+    if recording.measured != "position":
         settings = replace_settings(settings, differenced=False)  # a directly measured quantity has no drift and therefore no leakage from it
-    longest = recording.run(axis).rows
-    notes: list[str] = []
-    half = None
-    if period == 0:
-        period = find_period(repeats[longest])
-        if period and r is None and _samples(longest) < MANY * period and _distorted(recording, axis, longest):
-            period = None
-        alone = period is None and r is None and method.tapered and (settings.differenced or integrated) and not _closed_loop(recording, axis)
-        half = find_half_period(u[longest]) if alone else None
-    elif period:
-        notes += period_note(repeats[longest], period)
-    if half:
-        settings, period = replace_settings(settings, window="boxcar", length=2 * half, overlap=0.0), 2 * half
-        notes.append(HALVES.format(half=half, seconds=half / recording.sampling_rate))
-    elif period:
-        settings, runs = _periodic(settings, runs, period, notes, recording.sampling_rate, "input" if r is None else "reference")
-    else:
-        settings = _fitting(settings, runs, notes, method.tapered)
-    _possible(settings, recording.sampling_rate, _samples(longest) + (half or 0) + bool(period))
-    shape = method.shape(settings.window, settings.length, settings.overlap)
-    grid = 0 if period or not _fits(recording, runs, shape, settings.differenced) else 1
-    pieces = [(grid * int(recording.seq[run][0]), u[run], y[run]) for run in runs]
-    if half:
-        y = _sensed(recording, y, half, -1.0)
-        pieces = half_periods(u[longest], y[longest], half, settings.differenced)
-    elif period and r is None and settings.differenced:
-        pieces = [(seq, *one_more(inputs, outputs, period)) for seq, inputs, outputs in pieces]
+    windows = _windows(heard, settings, _repeats(heard, settings, period, notes), notes)
+    settings, period = windows.settings, windows.period
+    y = _sensed(recording, heard.y, windows.half or period or 0, -1.0 if windows.half else 1.0)
+    r = None if heard.r is None else _sensed(recording, heard.r, period or 0)
+    checked, pieces = (_pieces(heard, output, windows) for output in (y if windows.half else heard.y, y))
     frozen = max(round(settings.frozen * recording.sampling_rate), 2)
-    kept, left_out = stretches(pieces, shape, settings.differenced, frozen)
+    kept, left_out = stretches(checked, windows.shape, settings.differenced, frozen)
     notes += left_out
+    cut = [
+        (pieces[k][0] + start, np.zeros(0) if r is None else r[windows.runs[k]][start:stop], pieces[k][1][start:stop], pieces[k][2][start:stop])
+        for k, start, stop in kept
+    ]
     options = H1Options(
         differenced=settings.differenced,
         periodic=bool(period),
@@ -114,26 +91,94 @@ def estimate(recording: Recording, axis: str, settings: IdentifierSettings, peri
         units=(recording.units.input, recording.units.measured),
         rate_error=error_of_rate(recording.time, recording.seq),
     )
-    if integrated and not half:
-        y, r = _sensed(recording, y, period or 0), None if r is None else _sensed(recording, r, period or 0)
-        pieces = [(seq, inputs, y[run]) for (seq, inputs, _), run in zip(pieces, runs, strict=True)]
-    none = np.zeros(0)
-    cut = [
-        (pieces[k][0] + start, none if r is None else r[runs[k]][start:stop], pieces[k][1][start:stop], pieces[k][2][start:stop])
-        for k, start, stop in kept
-    ]
-    sums = method.whole(cut, shape, settings.differenced)
-    frf = method.estimate(sums, shape, recording.sampling_rate, options)
+    sums = method.whole(cut, windows.shape, settings.differenced)
+    frf = method.estimate(sums, windows.shape, recording.sampling_rate, options)
     notes += [method.note] if method.note else []
-    if period and r is None and not half and settings.response == "h1":
-        frf = best_linear(frf, _realisations([(u, y) for _, u, y in pieces], period, settings.differenced))
+    if period and not windows.half and method.plain:
+        frf = best_linear(frf, _realisations([(inputs, outputs) for _, inputs, outputs in pieces], period, settings.differenced))
         notes += [BEST] if frf.noise.size else []
     frf = replace(frf, sigma=np.maximum(frf.sigma, ROUNDING * np.abs(frf.response)))
     notes += _coherence(frf, settings, bool(period))
-    longest = max(runs, key=_samples)
-    friction = friction_note(friction_hint(u[longest], y[longest], recording.sampling_rate))
-    notes += [*(_closed_loop(recording, axis) if r is None else []), *([friction] if friction else [])]
-    return AxisEstimate(axis=axis, frf=frf, period=period or None, windows=int(method.windows(sums)), notes=tuple(notes))
+    notes += [] if method.reference else _closed_loop(recording, axis)
+    longest = max(windows.runs, key=_samples)
+    friction = friction_note(friction_hint(heard.u[longest], y[longest], recording.sampling_rate))
+    notes += [friction] if friction else []
+    return AxisEstimate(axis=axis, frf=frf, period=period, windows=int(method.windows(sums)), notes=tuple(notes))
+
+
+@dataclass(frozen=True, slots=True)
+class _Signals:
+    """One axis. longest: its longest run; u, y, r: (n,) input, output, and the reference if the method needs one."""
+
+    recording: Recording
+    axis: str
+    longest: slice
+    u: FloatArray
+    y: FloatArray
+    r: FloatArray | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Windows:
+    """Where windows are cut. runs: of samples; period: samples of one, or None; half: samples of half a period, if only halves repeat."""
+
+    settings: IdentifierSettings
+    shape: WindowShape
+    runs: list[slice]
+    period: int | None
+    half: int | None
+
+
+def _heard(recording: Recording, axis: str, method: ResponseMethod) -> _Signals:
+    """The signals of an axis, all of which move."""
+    u, y = recording.axis(axis)
+    r = _reference(recording, axis) if method.reference else None
+    _moving(axis, u, y, (recording.units.input, recording.units.measured))
+    return _Signals(recording=recording, axis=axis, longest=recording.run(axis).rows, u=u, y=y, r=r)
+
+
+def _repeats(heard: _Signals, settings: IdentifierSettings, period: int | None, notes: list[str]) -> tuple[int | None, int | None]:
+    """Samples after which the input or reference repeats, and samples after which the input repeats with the other sign; None if it does not."""
+    recording, axis, longest = heard.recording, heard.axis, heard.longest
+    repeats = (heard.u if heard.r is None else heard.r)[longest]
+    if period:
+        notes += period_note(repeats, period)
+    if period != 0:
+        return period, None
+    period = find_period(repeats)
+    if period and heard.r is None and _samples(longest) < MANY * period and _distorted(recording, axis, longest):
+        period = None
+    drifts = recording.measured == "position" and not settings.differenced
+    alone = period is None and METHODS[settings.response].plain and not drifts and not _closed_loop(recording, axis)
+    return period, find_half_period(heard.u[longest]) if alone else None
+
+
+def _windows(heard: _Signals, settings: IdentifierSettings, repeats: tuple[int | None, int | None], notes: list[str]) -> _Windows:
+    """Windows of one period, or windows that fit into the record. Raises BadInput if there is none."""
+    (period, half), recording, method, runs = repeats, heard.recording, METHODS[settings.response], heard.recording.runs()
+    if half:
+        settings, period = replace_settings(settings, window="boxcar", length=2 * half, overlap=0.0), 2 * half
+        notes.append(HALVES.format(half=half, seconds=half / recording.sampling_rate))
+    elif period:
+        what = "input" if heard.r is None else "reference"
+        settings, runs = _periodic(settings, runs, period, notes, recording.sampling_rate, what)
+    else:
+        settings = _fitting(settings, runs, notes, method.tapered)
+    _possible(settings, recording.sampling_rate, _samples(heard.longest) + (half or 0) + bool(period))
+    shape = method.shape(settings.window, settings.length, settings.overlap)
+    return _Windows(settings=settings, shape=shape, runs=runs, period=period, half=half)
+
+
+def _pieces(heard: _Signals, y: FloatArray, windows: _Windows) -> list[tuple[int, FloatArray, FloatArray]]:
+    """(counter of the first sample, input, output) of each run, with samples added where a period or half of one is made of another."""
+    recording, u, differenced = heard.recording, heard.u, windows.settings.differenced
+    if windows.half:
+        return half_periods(u[heard.longest], y[heard.longest], windows.half, differenced)
+    grid = 0 if windows.period or not _fits(recording, windows.runs, windows.shape, differenced) else 1
+    pieces = [(grid * int(recording.seq[run][0]), u[run], y[run]) for run in windows.runs]
+    if windows.period and heard.r is None and differenced:
+        return [(seq, *one_more(inputs, outputs, windows.period)) for seq, inputs, outputs in pieces]
+    return pieces
 
 
 def _realisations(pieces: list[tuple[FloatArray, FloatArray]], period: int, differenced: bool) -> list[Realisation]:

@@ -13,6 +13,8 @@ from xy_sysid.response.frf import ComplexArray
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import Units, units_of
 
+GOOD_ERROR, POOR_ERROR = 0.02, 0.05  # relative errors: a model up to the first is good; above the second something is missing
+
 
 @dataclass(frozen=True, slots=True)
 class Ended:

@@ -87,6 +87,11 @@ class AxisData:
     work: Work = field(default_factory=Work, compare=False, repr=False)
 
     @property
+    def holds_out(self) -> bool:
+        """True if some windows are held out; False if the windows are so few that all of them are fitted and judge the fit as well."""
+        return not np.array_equal(self.held_out.begins, self.fitted.begins)
+
+    @property
     def noise_floor(self) -> float:
         """The smallest error that the data can show: encoder noise and the tolerated part of the motion, m/s rms."""
         return self.layout.rms(self.floor.power)

@@ -10,7 +10,7 @@ otherwise updated with the result of the step (Broyden 1965).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -122,6 +122,61 @@ class Solution:
         return known + model_error_covariance(whitened, least.epsilon * self.target.measured * self.weight, layout, noise)
 
 
+@dataclass(frozen=True, slots=True)
+class _Point:
+    """Where a search is.
+
+    inner: (k,) the solver's coordinates; error: (windows, lines) and its derivatives change: (k, windows, lines); exact: False if updated only
+    """
+
+    inner: FloatArray
+    error: NDArray[np.complex128]
+    change: NDArray[np.complex128]
+    exact: bool
+
+    def equations(self, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(k, k) products of the whitened derivatives, and (k,) their products with the error."""
+        with np.errstate(over="ignore", invalid="ignore"):  # a trial model may diverge
+            columns = (self.change * weight).reshape(self.inner.size, -1).view(np.float64)
+            return columns @ columns.T, columns @ (self.error * weight).ravel().view(np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class _Round:
+    """The end of a round with one set of weights: see ``Solution``."""
+
+    point: _Point
+    cost: float
+    normal: FloatArray
+    converged: bool = False
+
+
+class _Simulations:
+    """Errors of parameters, and their derivatives; runs: number of simulations."""
+
+    def __init__(self, run: Predictor, target: Target, scale: Scale) -> None:
+        self._run, self._target, self.scale, self.runs = run, target, scale, 0
+
+    def error(self, inner: FloatArray) -> NDArray[np.complex128]:
+        self.runs += 1
+        return self._error(inner)
+
+    def _error(self, inner: FloatArray) -> NDArray[np.complex128]:
+        return np.asarray(self._target.measured - self._target.windows.spectrum(self._run(self.scale.outer(inner))))
+
+    def slopes(self, inner: FloatArray, error: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Derivatives of the error by forward differences."""
+        self.runs += inner.size
+
+        def slope(k: int) -> NDArray[np.complex128]:
+            step = STEP if self.scale.outer(inner)[k] < self.scale.high[k] else -STEP
+            moved = inner.copy()
+            moved[k] += step
+            return np.asarray((self._error(moved) - error) / step)
+
+        return np.array(on_all_cores(slope, range(inner.size)))
+
+
 def solve(
     run: Predictor,
     target: Target,
@@ -135,93 +190,70 @@ def solve(
     run: parameters -> velocity (n,), called from several threads at once; schedule: when to end;
     known: an earlier solution that ended at ``start``: its derivatives are used as an approximation, and its error if it had the same ``run``
     """
-    windows, measured = target.windows, target.measured
-    runs = 0
-
-    def left(inner: FloatArray) -> NDArray[np.complex128]:
-        return np.asarray(measured - windows.spectrum(run(scale.outer(inner))))
-
-    def slopes(inner: FloatArray, error: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Derivatives of the error by forward differences."""
-        nonlocal runs
-        runs += inner.size
-
-        def slope(k: int) -> NDArray[np.complex128]:
-            step = STEP if scale.outer(inner)[k] < scale.high[k] else -STEP
-            moved = inner.copy()
-            moved[k] += step
-            return np.asarray((left(moved) - error) / step)
-
-        return np.array(on_all_cores(slope, range(inner.size)))
-
-    inner = scale.inner(start)
-    if known is not None and known.run is run:
-        error = known.error
-    else:
-        error, runs = left(inner), runs + 1
-    size = inner.size
-    normal, cost, converged = np.eye(size), np.inf, False
-    change = slopes(inner, error) if known is None else known.change
-    exact = known is None
+    simulated, inner = _Simulations(run, target, scale), scale.inner(start)
+    error = known.error if known is not None and known.run is run else simulated.error(inner)
+    here = _Point(inner, error, simulated.slopes(inner, error) if known is None else known.change, known is None)
     expected, score = target.spectrum(error)
-    weight = _weight(target, expected)
+    weight, ended = _weight(target, expected), _Round(here, np.inf, np.eye(inner.size))
     for _ in range(schedule.rounds):
-        before = inner, error, change, exact
-        cost = _cost(error * weight)
-        damping, converged, fresh = 1e-3, False, False
-        for _ in range(schedule.steps):
-            if not fresh:
-                with np.errstate(over="ignore", invalid="ignore"):  # a trial model may diverge
-                    columns = (change * weight).reshape(size, -1).view(np.float64)
-                    normal, slope = columns @ columns.T, columns @ (error * weight).ravel().view(np.float64)
-                fresh = True
-            if schedule.late() or not (np.all(np.isfinite(normal)) and np.any(normal)):  # a diverging model, or one that does not move
-                break
-            diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
-            move = _move(normal + damping * np.diag(diagonal), slope, scale, scale.outer(inner))
-            move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
-            trial = scale.inner(scale.outer(inner + move))
-            found, runs = left(trial), runs + 1
-            new = _cost(found * weight)
-            if np.isfinite(new) and new < cost:
-                fall, taken = (cost - new) / cost, trial - inner
-                expected_decrease = -float(2.0 * slope @ taken + taken @ normal @ taken)
-                if abs((cost - new) - expected_decrease) < TRUSTED * expected_decrease:
-                    change, exact = _updated(change, taken, diagonal, found - error), False
-                else:
-                    change, exact = slopes(trial, found), True
-                inner, error, cost, fresh = trial, found, new, False
-                damping = max(damping * 0.2, 1e-9)
-                if fall < schedule.enough:
-                    converged = True
-                    break
-            elif not exact:
-                change, exact, fresh = slopes(inner, error), True, False
-            else:
-                damping *= 10.0
-                if damping > 1e6:
-                    converged = True
-                    break
-        expected, now = target.spectrum(error)
+        ended = _round(simulated, here, weight, schedule)
+        expected, now = target.spectrum(ended.point.error)
         if not now < score:
-            inner, error, change, exact = before
             break
-        gained, score, weight = score - now, now, _weight(target, expected)
+        gained, here, score, weight = score - now, ended.point, now, _weight(target, expected)
         if gained < schedule.settled:
             break
     return Solution(
-        values=scale.outer(inner),
-        cost=cost,
+        values=scale.outer(here.inner),
+        cost=ended.cost,
         score=score,
-        runs=runs,
-        converged=converged,
+        runs=simulated.runs,
+        converged=ended.converged,
         run=run,
         target=target,
-        error=error,
-        change=change,
+        error=here.error,
+        change=here.change,
         weight=weight,
-        normal=normal,
+        normal=ended.normal,
     )
+
+
+def _round(simulated: _Simulations, here: _Point, weight: FloatArray, schedule: Schedule) -> _Round:
+    """Steps with one set of weights: Levenberg-Marquardt."""
+    cost, damping, stale, normal, slope = _cost(here.error * weight), 1e-3, True, np.eye(here.inner.size), here.inner
+    for _ in range(schedule.steps):
+        if stale:
+            normal, slope = here.equations(weight)
+            stale = False
+        if schedule.late() or not (np.all(np.isfinite(normal)) and np.any(normal)):  # a diverging model, or one that does not move
+            break
+        diagonal = np.maximum(np.diag(normal), 1e-12 * float(np.max(np.diag(normal))) + 1e-300)
+        trial = _trial(here.inner, normal + damping * np.diag(diagonal), slope, simulated.scale)
+        error = simulated.error(trial)
+        new = _cost(error * weight)
+        if np.isfinite(new) and new < cost:
+            taken, fall = trial - here.inner, cost - new
+            expected = -float(2.0 * slope @ taken + taken @ normal @ taken)
+            exact = not abs(fall - expected) < TRUSTED * expected
+            change = simulated.slopes(trial, error) if exact else _updated(here.change, taken, diagonal, error - here.error)
+            here, stale, damping = _Point(trial, error, change, exact), True, max(damping * 0.2, 1e-9)
+            cost, settled = new, fall / cost < schedule.enough
+            if settled:
+                return _Round(here, cost, normal, True)
+        elif not here.exact:
+            here, stale = replace(here, change=simulated.slopes(here.inner, here.error), exact=True), True
+        else:
+            damping *= 10.0
+            if damping > 1e6:
+                return _Round(here, cost, normal, True)
+    return _Round(here, cost, normal)
+
+
+def _trial(inner: FloatArray, normal: FloatArray, slope: FloatArray, scale: Scale) -> FloatArray:
+    """(k,) the solver's coordinates after a step of at most 2, within the bounds."""
+    move = _move(normal, slope, scale, scale.outer(inner))
+    move *= min(1.0, 2.0 / float(np.max(np.abs(move)) + 1e-300))
+    return scale.inner(scale.outer(inner + move))
 
 
 def _move(normal: FloatArray, slope: FloatArray, scale: Scale, values: FloatArray) -> FloatArray:

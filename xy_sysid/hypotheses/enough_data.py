@@ -31,7 +31,7 @@ def prepared(
         data = prepare_all(sampling_rate, recordings, epsilon, units)
     except BadInput as problem:
         return str(problem)
-    if data.held_out is data.fitted:
+    if not data.holds_out:
         seconds = voltage.size / sampling_rate
         return f"{seconds:.3g} s without a gap are too few windows to fit some and judge by others; record longer, better 60 s."
     lacking = _lacking(data, sampling_rate, voltage, position)

@@ -14,6 +14,7 @@ from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import derivative_of
 
 ON_THE_EDGE = 1e-9  # relative distance from the stability limit that counts as on the limit
+LIGHT_DAMPING = 0.4  # damping ratio; a pole pair with more is not called a resonance
 
 
 @dataclass(frozen=True, slots=True)

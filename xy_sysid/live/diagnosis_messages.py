@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from xy_sysid.diagnosis import words
+from xy_sysid.live import status_values
 from xy_sysid.live.plain_messages import OK, STALE, WARN, ArrayMessage, StatusMessage, topic_of
 from xy_sysid.story.acts import sentence
 from xy_sysid.story.story import Story
@@ -21,7 +22,7 @@ def ladder_message(story: Story) -> ArrayMessage:
 
 def diagnosis_status(story: Story) -> StatusMessage:
     """``diagnosis``: verdict, errors and ranking of one axis; OK if the model explains it or nothing is missing, else WARN."""
-    values: dict[str, str] = {"seconds of data (s)": f"{story.seconds:.6g}", "tolerance (1)": f"{story.tolerance:.3g}"}
+    values: dict[str, str] = {status_values.SECONDS: f"{story.seconds:.6g}", "tolerance (1)": f"{story.tolerance:.3g}"}
     found, now = story.diagnosis, story.now
     if found is not None:
         values |= {
@@ -41,8 +42,7 @@ def diagnosis_status(story: Story) -> StatusMessage:
             "explained": str(now.explained).lower(),
         }
         for item in now.parameters:
-            values[f"{item.name} ({item.unit or '1'})"] = f"{item.value:.9g}"
-            values[f"{item.name} 95 % low"], values[f"{item.name} 95 % high"] = f"{item.low:.9g}", f"{item.high:.9g}"
+            values |= status_values.written(item)
     if found is not None:
         values |= {f"candidate {k}": f"{one.name}: {words.evidence(found, one)}" for k, one in enumerate(found.candidates, start=1)}
         values |= {"runner-up": lost} if (lost := words.runner_up(found)) else {}

@@ -16,9 +16,10 @@ from xy_sysid.errors import BadInput
 from xy_sysid.fitting import identify
 from xy_sysid.fitting.choose_orders import Choice, choose, stands
 from xy_sysid.fitting.modes import pole_estimates
-from xy_sysid.fitting.result import Fit
+from xy_sysid.fitting.result import POOR_ERROR, Fit
 from xy_sysid.fitting.structure import FitOptions, structure_from
-from xy_sysid.linear.transfer_function import TransferFunction
+from xy_sysid.linear.transfer_function import LIGHT_DAMPING, TransferFunction
+from xy_sysid.live import status_values
 from xy_sysid.live.coupling_messages import coupling_messages, coupling_status
 from xy_sysid.live.identifier import AxisRequest, FitRequest
 from xy_sysid.live.messages import comparison_message, frf_message, transfer_function_message
@@ -35,11 +36,9 @@ from xy_sysid.samples.pairing import QUANTITIES, Pairer
 from xy_sysid.samples.ring import RATE_SAMPLES
 from xy_sysid.settings import IdentifierSettings
 
-LIGHT_DAMPING = 0.4  # a pole pair with more damping is not a resonance to watch
 FIRST_FITS = 3  # fits in which a warm start that noise does not explain is checked against a cold start
 LATER_DOUBT = 15  # later, one of this many fits: noise never explains an axis with friction, and a cold start is slow
 OPTIONS = FitOptions(relative_change=1e-6)  # of the cost: leaves at most a hundredth of a standard error
-GOOD_ERROR = 0.05  # relative error above which an axis's sentence says that the model does not fit yet
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,27 +181,25 @@ def _status(axis: str, update: AxisUpdate, request: FitRequest) -> StatusMessage
     fit, track = update.fit, update.track
     values: dict[str, str] = {
         "fit": str(request.number),
-        "windows": str(update.windows),
+        status_values.WINDOWS: str(update.windows),
         "averages": f"{update.frf.averages:.6g}",
-        "seconds of data (s)": f"{request.seconds:.6g}",
-        "sampling rate (Hz)": f"{request.sampling_rate:.9g}",
-        "input unit": update.frf.input_unit,
-        "output unit": update.frf.output_unit,
-        "dropped windows": str(sum(update.dropped.values())),
+        status_values.SECONDS: f"{request.seconds:.6g}",
+        status_values.RATE: f"{request.sampling_rate:.9g}",
+        status_values.INPUT_UNIT: update.frf.input_unit,
+        status_values.OUTPUT_UNIT: update.frf.output_unit,
+        status_values.DROPPED: str(sum(update.dropped.values())),
     }
-    values |= {f"dropped windows: {reason}": str(number) for reason, number in sorted(update.dropped.items())}
+    values |= {f"{status_values.DROPPED_FOR}{reason}": str(number) for reason, number in sorted(update.dropped.items())}
     values |= {f"stream: {reason}": str(number) for reason, number in sorted(request.faults.items())}
     if fit is None:
         return StatusMessage(f"axis {axis}", WARN, f"axis {axis}: no fit yet: {update.problem}", tuple(values.items()))
-    values["relative error (1)"], values["misfit (1)"] = f"{fit.relative_error:.6g}", f"{fit.misfit:.6g}"
+    values[status_values.RELATIVE_ERROR], values["misfit (1)"] = f"{fit.relative_error:.6g}", f"{fit.misfit:.6g}"
     for item in fit.intervals:
         if item.name in ("delay", "gain") or "resonance" in item.name:
-            label = f"{item.name} ({item.unit or '1'})"
-            values[label] = f"{item.value:.9g}"
-            values[f"{item.name} 95 % low"], values[f"{item.name} 95 % high"] = f"{item.low:.9g}", f"{item.high:.9g}"
+            values |= status_values.written(item)
     values["cost"], values["expected cost"] = f"{fit.cost:.6g}", f"{fit.expected_cost:.6g}"
     if track.reference and track.now:
-        values["resonance watched (Hz)"], values["resonance reference (Hz)"] = f"{track.now.frequency:.6g}", f"{track.reference.frequency:.6g}"
+        values[status_values.WATCHED], values[status_values.REFERENCE] = f"{track.now.frequency:.6g}", f"{track.reference.frequency:.6g}"
         values["resonance shift (Hz)"] = f"{track.shift:.6g}"
     level, sentence = _verdict(axis, update, request)
     return StatusMessage(f"axis {axis}", level, sentence, tuple(values.items()))
@@ -214,7 +211,7 @@ def _verdict(axis: str, update: AxisUpdate, request: FitRequest) -> tuple[int, s
         return ERROR, alarm_sentence(axis, update.track)
     if fit is None or not fit.converged:
         return WARN, f"axis {axis}: the fit did not converge: {fit.reason if fit else update.problem}"
-    if fit.relative_error > GOOD_ERROR:
+    if fit.relative_error > POOR_ERROR:
         return WARN, f"axis {axis}: relative error {100 * fit.relative_error:.2g} %; the model does not fit (yet)"
     if request.going_on[axis]:
         reasons = ", ".join(request.going_on[axis])

@@ -221,7 +221,7 @@ class Identifier:
 
     def _start_coupling(self) -> None:
         """For two axes whose inputs are the drive; uses all data since the start, and is not kept over a restart."""
-        judged = len(self.axes) > 1 and self.settings.response == "h1" and self.settings.differenced
+        judged = len(self.axes) > 1 and self._method.plain and self.settings.differenced
         self._long = WindowShape.of(self.settings.window, LONGER * self.settings.length, self.settings.overlap)
         self._both = RunningCrossSpectra(self._long) if judged else None
         self._coupled = None
@@ -315,7 +315,7 @@ class Identifier:
     @property
     def _named(self) -> tuple[str, ...]:
         """Names for the states; states of output over input, the first method, have none."""
-        return () if self.settings.response == "h1" else (self.settings.response,)
+        return () if self._method.plain else (self.settings.response,)
 
     def restore(self, state: State) -> None:
         """Continue from a saved state; raises BadInput if it has other axes or windows."""

@@ -25,6 +25,7 @@ from xy_sysid.control_design.worth import encoder_of_floor
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.files.story_models import model_of
 from xy_sysid.live.plain_messages import ERROR, OK, WARN, ArrayMessage, topic_of
+from xy_sysid.live.status_values import METRES
 from xy_sysid.nodes.common import DATA_QOS, LATCHED_QOS, STOP_TOPIC, WalledNode, declare_fixed, overrides
 from xy_sysid.nodes.convert import array_to_ros, from_message, status, to_message
 from xy_sysid.nodes.diagnostics import Diagnostics
@@ -219,7 +220,7 @@ class DemoFollowerNode(WalledNode):
             kind = next(iter(self._followers.values())).kind
             told = "moving to the start of the path" if kind is None else f"following the path: {KINDS[kind]}"
         for axis, errors in self._errors.items():
-            values |= {f"axis {axis} {name} (m)": f"{value:.6g}" for name, value in zip(KINDS, errors, strict=False)}
+            values |= {f"axis {axis} {name}{METRES}": f"{value:.6g}" for name, value in zip(KINDS, errors, strict=False)}
             values[f"axis {axis} undone"] = ", ".join(self._followers[axis].plan.compensation.terms)
         level = {FAILED: ERROR, IDLE: OK, DONE: OK}.get(self._state, WARN if self._stopped else OK)
         self._metrics.publish([status("demo_follower", level, told, values)])

@@ -18,6 +18,7 @@ from std_srvs.srv import Trigger
 
 from xy_sysid.errors import BadInput
 from xy_sysid.files.effects import library
+from xy_sysid.live import status_values
 from xy_sysid.live.diagnoser import Diagnoser
 from xy_sysid.live.diagnosis_messages import diagnosis_status, ladder_message
 from xy_sysid.live.heard import verdict
@@ -143,17 +144,17 @@ class DiagnoserNode(WalledNode):
         if self._streams.recent.goes_on("callbacks", self.wall.count, time.monotonic()):
             level, text = max(level, WARN), f"{text}; {self.wall.told}"
         values = {
-            "seconds kept (s)": f"{hearing.seconds:.6g}",
+            status_values.KEPT: f"{hearing.seconds:.6g}",
             "samples paired": str(hearing.total),
-            "sampling rate (Hz)": f"{hearing.sampling_rate or 0.0:.9g}",
+            status_values.RATE: f"{hearing.sampling_rate or 0.0:.9g}",
             "messages refused": str(self._streams.refusals),
             "errors of callbacks": str(self.wall.count),
             "progress": self._diagnoser.doing or IDLE,
-            "seconds heard (s)": f"{hearing.total / hearing.sampling_rate if hearing.sampling_rate else 0.0:.6g}",
+            status_values.HEARD: f"{hearing.total / hearing.sampling_rate if hearing.sampling_rate else 0.0:.6g}",
         }
         for axis in self._axes:
             used = self._diagnoser.used(axis)
-            values |= {f"axis {axis} used {end} (s)": f"{at:.6g}" for end, at in zip(("from", "to"), used, strict=True)} if used is not None else {}
+            values |= {name: f"{at:.6g}" for name, at in zip(status_values.used(axis), used, strict=True)} if used is not None else {}
         values |= {f"stream: {reason}": str(number) for reason, number in hearing.faults.items()}
         status = StatusMessage("diagnoser", level, text, tuple(values.items()))
         self._metrics.publish(status_to_ros(item, "diagnoser") for item in (status, *self._since.statuses()))

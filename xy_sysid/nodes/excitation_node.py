@@ -28,6 +28,7 @@ from xy_sysid.excitation.pacing import CATCH_UP, Answers, Clock
 from xy_sysid.excitation.trajectory_drive import TrajectoryDrive, drive_of
 from xy_sysid.files.experiment import read_experiment
 from xy_sysid.live.recent import Recent
+from xy_sysid.live.status_values import INPUT_UNIT, OUTPUT_UNIT
 from xy_sysid.nodes.axes import AXES, declare_axes
 from xy_sysid.nodes.commands import Beat, Commands
 from xy_sysid.nodes.common import DATA_QOS, NAMESPACE, declare
@@ -534,7 +535,7 @@ class ExcitationNode(Overridable, LifecycleNode):
         self._stop_told = stop
         if stop or (refused and (drive is None or drive.state != "active")):
             message, level = stop or self._refused, max(level, 1)
-        values["input unit"], values["output unit"] = self._knobs.settings.units
+        values[INPUT_UNIT], values[OUTPUT_UNIT] = self._knobs.settings.units
         values["stop"] = "on" if self._stop.held else "off"
         values["stop held by"] = ", ".join(self._stop.holders)
         values["listeners"] = str(self.count_subscribers(self._way))

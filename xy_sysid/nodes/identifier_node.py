@@ -16,6 +16,7 @@ from std_srvs.srv import Trigger
 
 from xy_sysid.errors import BadInput, XySysidError
 from xy_sysid.files.state import load_state, save_state, set_aside
+from xy_sysid.live import status_values
 from xy_sysid.live.coupling_messages import coupling_topics
 from xy_sysid.live.fitter import LiveFitter, Update, warm_up
 from xy_sysid.live.heard import verdict
@@ -108,7 +109,7 @@ class IdentifierNode(WalledNode):
             level, text = max(level, WARN), f"{text}; {self._worker.skipped} fits were skipped, the machine is too slow for this rate"
         values = {
             "samples paired": str(self._identifier.samples),
-            "sampling rate (Hz)": f"{self._identifier.sampling_rate or 0.0:.9g}",
+            status_values.RATE: f"{self._identifier.sampling_rate or 0.0:.9g}",
             "messages refused": str(self._streams.refusals),
             "errors of callbacks": str(self.wall.count),
             "skipped fits": str(self._worker.skipped),

@@ -18,6 +18,7 @@ from xy_sysid.nodes.common import DATA_QOS
 from xy_sysid.nodes.convert import from_message
 from xy_sysid.nodes.hearing import Ear
 from xy_sysid.processes.terminal import printable
+from xy_sysid.response.methods import METHODS
 from xy_sysid.samples.block import Block, StreamName
 from xy_sysid.samples.integral import integrated
 from xy_sysid.samples.joint_fields import JointReader, joints_of
@@ -49,8 +50,7 @@ class Streams:
         if source == "joint_state" and settings.output == "velocity":
             node.get_logger().info(integrated(settings.units.speed))
         self._node, self._axes, self._effort, self._output, self._give = node, axes, effort, settings.output, feed
-        closed = isinstance(settings, IdentifierSettings) and settings.response == "joint_input_output"
-        self._streams: tuple[StreamName, ...] = (*QUANTITIES, "reference") if closed else QUANTITIES
+        self._streams = METHODS[settings.response].streams if isinstance(settings, IdentifierSettings) else QUANTITIES
         self.forget()
         self._by_stamp = source == "joint_state"
         if self._by_stamp:
@@ -59,7 +59,7 @@ class Streams:
             Ear(node, Float64MultiArray, "position", self._on_position, DATA_QOS)
         if source == "blocks" or not effort:
             Ear(node, Float64MultiArray, "voltage", self._on_voltage, DATA_QOS)
-        if closed:
+        if "reference" in self._streams:
             Ear(node, Float64MultiArray, "reference", self._on_reference, DATA_QOS)
 
     def forget(self) -> None:

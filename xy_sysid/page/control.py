@@ -8,6 +8,7 @@ from collections.abc import Callable
 from nicegui import run, ui
 
 from xy_sysid.errors import XySysidError
+from xy_sysid.live.status_values import SECONDS, WINDOWS, number
 from xy_sysid.page import will_move
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.facts import dropped_words, seconds_text
@@ -119,9 +120,9 @@ class Control:
         rows = []
         for axis in axes:
             values = heard.values(f"axis {axis}")
-            if "windows" in values:
-                data = float(values.get("seconds of data (s)", "0"))
-                rows.append((f"axis {axis}", f"{values['windows']} windows in {seconds_text(data)}, dropped: {dropped_words(values)}"))
+            if WINDOWS in values:
+                data = seconds_text(number(values, SECONDS, 0.0))
+                rows.append((f"axis {axis}", f"{values[WINDOWS]} windows in {data}, dropped: {dropped_words(values)}"))
         if rows == getattr(self, "_rows", None):
             return
         self._rows = rows

@@ -10,18 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from xy_sysid.fitting.result import GOOD_ERROR, POOR_ERROR
+from xy_sysid.linear.transfer_function import LIGHT_DAMPING
 from xy_sysid.live.plain_messages import ArrayMessage
+from xy_sysid.live.status_values import DROPPED, DROPPED_FOR, RELATIVE_ERROR, WINDOWS, Values, estimate_of
+from xy_sysid.live.status_values import number as number_of
 from xy_sysid.page.topics_state import columns
 from xy_sysid.report.story_curves import between
 from xy_sysid.report.story_parts import pictured, row
 from xy_sysid.report.words import interval_text, moved, number, quantity
 from xy_sysid.samples.block import FloatArray
 
-Values = Mapping[str, str]
 RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 ENOUGH = 12  # windows
-LIGHT = 0.4  # damping ratio above which a pair is not called a resonance
-GOOD_ERROR, POOR_ERROR = 0.02, 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,22 +66,21 @@ def facts(values: Values, response: ArrayMessage | None = None, fails: bool = Fa
     """Facts of the identifier's status of an axis; response: its ``frf`` message, for the coherence; fails: True if its model fails in any band."""
     found: list[Fact] = []
     for name in ESTIMATES:
-        key = next((k for k in values if k.startswith(f"{name} (")), None)
-        if key is None:
+        told = estimate_of(values, name)
+        if told is None:
             continue
-        unit, label = key.partition("(")[2].rstrip(")"), name.partition("_1")[0]
-        value, low, high = _float(values, key), _float(values, f"{name} 95 % low"), _float(values, f"{name} 95 % high")
-        shown = interval_text(value, low, high, unit, name) if math.isfinite(low) and math.isfinite(high) else quantity(value, unit)
+        label, bounded = name.partition("_1")[0], math.isfinite(told.low) and math.isfinite(told.high)
+        shown = interval_text(told.value, told.low, told.high, told.unit, name) if bounded else quantity(told.value, told.unit)
         found.append(Fact(label, shown, MEANINGS[label] + (UNSURE if fails else ""), sure=not fails))
-    error = _float(values, "relative error (1)")
+    error = number_of(values, RELATIVE_ERROR)
     if math.isfinite(error):
         found.append(Fact("relative error", f"{number(100 * error, 3)} %", MEANINGS["relative error"], _within(error, GOOD_ERROR, POOR_ERROR)))
     rows = columns(response) if response is not None else {}
     if rows.get("coherence") is not None and rows["coherence"].size:
         found.append(coherence_fact(rows["frequency"], rows["coherence"]))
-    if "windows" in values:
-        enough = values["windows"].isdigit() and int(values["windows"]) >= ENOUGH
-        found.append(Fact("windows", values["windows"], MEANINGS["windows"], True if enough else None))
+    windows = values.get(WINDOWS)
+    if windows is not None:
+        found.append(Fact("windows", windows, MEANINGS["windows"], True if windows.isdigit() and int(windows) >= ENOUGH else None))
     dropped = dropped_words(values)
     if dropped:
         found.append(Fact("windows dropped", dropped, MEANINGS["windows dropped"], dropped == "none"))
@@ -117,7 +117,7 @@ def story_facts(document: Mapping[str, Any], step: int | None = None) -> list[Fa
         found.append(Fact(label, text, meaning + (UNSURE if fails else ""), sure=not fails))
     for kind, label in (("zeros", "antiresonance"), ("poles", "resonance")):
         for root in pictures["linear"][kind] if pictures is not None else ():
-            if root["imag"] and root["frequency"] and root["damping"] is not None and root["damping"] < LIGHT:
+            if root["imag"] and root["frequency"] and root["damping"] is not None and root["damping"] < LIGHT_DAMPING:
                 shown = f"{number(root['frequency'], 4)} Hz, damping {number(root['damping'], 2)}"
                 found.append(Fact(label, shown, MEANINGS[label], sure=not fails))
     return found
@@ -146,12 +146,12 @@ def coherence_fact(frequency: FloatArray, coherence: FloatArray) -> Fact:
 
 def dropped_words(values: Values) -> str:
     """Number of dropped windows with reasons; empty while nothing is known."""
-    if "dropped windows" not in values:
+    if DROPPED not in values:
         return ""
-    reasons = [f"{_reason(key)} {values[key]}" for key in values if key.startswith("dropped windows: ") and values[key] != "0"]
-    if values["dropped windows"] == "0":
+    reasons = [f"{_reason(key.removeprefix(DROPPED_FOR))} {values[key]}" for key in values if key.startswith(DROPPED_FOR) and values[key] != "0"]
+    if values[DROPPED] == "0":
         return "none"
-    return f"{values['dropped windows']} ({', '.join(reasons)})" if reasons else values["dropped windows"]
+    return f"{values[DROPPED]} ({', '.join(reasons)})" if reasons else values[DROPPED]
 
 
 REASONS = {
@@ -166,16 +166,8 @@ REASONS = {
 }
 
 
-def _reason(key: str) -> str:
-    name = key.partition(": ")[2]
+def _reason(name: str) -> str:
     return REASONS.get(name, name.replace("_", " "))
-
-
-def _float(values: Values, key: str) -> float:
-    try:
-        return float(values.get(key, "nan"))
-    except ValueError:
-        return math.nan
 
 
 def _within(value: float, good: float, poor: float) -> bool | None:

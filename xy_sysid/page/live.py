@@ -12,6 +12,7 @@ from xy_sysid.axis.model import STANDARD
 from xy_sysid.errors import BadInput
 from xy_sysid.live.diagnoser import WAITS
 from xy_sysid.live.plain_messages import topic_of
+from xy_sysid.live.status_values import HEARD, KEPT, number, used
 from xy_sysid.page.facts import seconds_text
 from xy_sysid.page.link import Link
 from xy_sysid.page.orders import Order, OrderKind, OrderState
@@ -130,10 +131,10 @@ class Live:
         document = self.document(axis)
         if document is None:
             return ""
-        ends = _number(values, f"axis {axis} used from (s)"), _number(values, f"axis {axis} used to (s)")
+        ends = [number(values, name) for name in used(axis)]
         if not all(math.isfinite(end) for end in ends):
             return f"Fitted to {float(document['seconds']):.0f} s of data that are no longer kept."
-        newer = max(_number(values, "seconds heard (s)") - ends[1], 0.0)
+        newer = max(number(values, HEARD) - ends[1], 0.0)
         more = f"{seconds_text(newer)} of newer data have come." if newer >= NEWER else "They are the newest."
         return f"Fitted to seconds {ends[0]:.0f} to {ends[1]:.0f} of the data. {more}"
 
@@ -144,8 +145,8 @@ class Live:
     def newer(self, axis: str) -> bool:
         """True if there are newer data than those of the story."""
         values = self.heard.values(NODE)
-        end = _number(values, f"axis {axis} used to (s)")
-        return axis in self.heard.stories and not _number(values, "seconds heard (s)") < end + NEWER
+        end = number(values, used(axis)[1])
+        return axis in self.heard.stories and not number(values, HEARD) < end + NEWER
 
     def effects(self) -> tuple[str, ...]:
         """Effects of the library; other effects of the diagnoser can be added with its parameter."""
@@ -208,15 +209,8 @@ class Live:
 
     def _kept(self) -> float:
         """s of data that the diagnoser keeps."""
-        return _number(self.heard.values(NODE), "seconds kept (s)", 0.0)
+        return number(self.heard.values(NODE), KEPT, 0.0)
 
     def _effects(self, axis: str) -> list[str]:
         ladder = (self.document(axis) or {}).get("ladder") or [{}]
         return [str(name) for name in ladder[-1].get("effects", [])]
-
-
-def _number(values: dict[str, str], name: str, without: float = math.nan) -> float:
-    try:
-        return float(values[name])
-    except (KeyError, ValueError):
-        return without

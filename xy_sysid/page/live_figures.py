@@ -12,16 +12,31 @@ from xy_sysid.linear.simulate import held_response
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.plain_messages import ArrayMessage
 from xy_sysid.page.topics_state import Tracked, columns, thinned
-from xy_sysid.report.parts import band, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
-from xy_sysid.report.story_curves import fit_range, stretches
+from xy_sysid.report.parts import (
+    aligned,
+    band,
+    bounded,
+    broken,
+    decibel,
+    frequency_axis,
+    outline,
+    phase_of,
+    plain,
+    positive,
+    rows,
+    true_runs,
+    turns,
+    unbroken,
+)
+from xy_sysid.report.story_curves import fit_range
 from xy_sysid.report.story_parts import LINE, NAMED, grey
 from xy_sysid.report.theme import BEFORE, FAILS, MEASURED, MODEL, UNTRUSTED, fade
 from xy_sysid.response.frf import Z95
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.settings import LEAST_COHERENCE
 from xy_sysid.units import USUAL, Units, over, readable
 
 MOST = 1200  # lines drawn
-LEAST = 0.3  # coherence of a trusted line
 SOLID, DASHED = {"color": MEASURED, "width": 1.8}, {"color": MODEL, "width": 1.8, "dash": "dash"}
 NOTABLE = 4.0  # standard errors above which a range of lines is shaded
 STRETCH = 3  # number of neighbouring lines whose mean must exceed it
@@ -40,18 +55,13 @@ def response_figure(
     kept = thinned(frequency, np.abs(response), MOST)
     kept = kept[frequency[kept] > 0]
     frequency, coherence, response, sigma = frequency[kept], coherence[kept], response[kept], table["sigma"][kept]
-    trusted = coherence >= LEAST
+    trusted = coherence >= LEAST_COHERENCE
     usable = trusted if bool(trusted.any()) else ~trusted
     figure = rows(4, shared=True, gap=0.04, heights=[0.24, 0.36, 0.24, 0.16])
-    part = Z95 * np.where(np.isfinite(sigma), sigma, 0.0) / np.sqrt(2) / np.maximum(np.abs(response), 1e-300)
-    level, phase = decibel(response, units.output), phase_of(response)
-    turn = np.degrees(np.arcsin(np.minimum(part, 1.0)))
-    curves = (
-        (2, level, level + 20 * np.log10(np.maximum(1 - part, 1e-3)), level + 20 * np.log10(1 + part)),
-        (3, phase, phase - turn, phase + turn),
-    )
-    pieces = _stretches(trusted, frequency)
-    for row, middle, low, high in curves:
+    curves = bounded(response, sigma, units.output)
+    (level, *_), (phase, *_) = curves
+    pieces = _pieces(trusted, frequency)
+    for row, (middle, low, high) in enumerate(curves, start=2):
         _untrusted(figure, row, frequency, middle, ~trusted, row == 2)
         if pieces:
             band(figure, row, outline(pieces, frequency, low, high), MEASURED, "measured", "95 % band" if row == 2 else "")
@@ -61,7 +71,7 @@ def response_figure(
         model = held_response(tf, frequency, sampling_rate) if sampling_rate > 0 else tf.response(frequency)
         shifted = phase_of(model)
         if bool(trusted.any()):
-            shifted = shifted + 360 * np.round(np.median((phase - shifted)[trusted]) / 360)
+            shifted = aligned(shifted, phase, trusted)
         shown[2].append(decibel(model, units.output))
         shown[3].append(shifted)
         _curve(figure, 2, (frequency, shown[2][1]), DASHED, "model", True)
@@ -90,8 +100,7 @@ def failing(comparison: ArrayMessage | None) -> list[tuple[float, float, float]]
     if size.size < STRETCH:
         return []
     smooth = np.convolve(size, np.full(STRETCH, 1 / STRETCH), mode="same")
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], (smooth > NOTABLE).astype(np.int8), [0]))))
-    found = [(float(frequency[a]), float(frequency[b - 1]), float(size[a:b].max())) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    found = [(float(frequency[run][0]), float(frequency[run][-1]), float(size[run].max())) for run in true_runs(smooth > NOTABLE)]
     merged: list[tuple[float, float, float]] = []
     for low, high, worst in found:
         if merged and low < 1.15 * merged[-1][1]:
@@ -159,8 +168,8 @@ def _untrusted(figure: go.Figure, row: int, x: FloatArray, y: FloatArray, which:
         )
 
 
-def _stretches(trusted: np.ndarray, frequency: FloatArray) -> list[slice]:
+def _pieces(trusted: np.ndarray, frequency: FloatArray) -> list[slice]:
     """Slices of consecutive trusted lines."""
     if bool(trusted.all()):
         return unbroken(frequency) if frequency.size > 2 else [slice(0, frequency.size)]
-    return stretches(trusted)
+    return true_runs(trusted)

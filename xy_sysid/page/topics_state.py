@@ -14,8 +14,9 @@ import numpy as np
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.live.messages import read_transfer_function
 from xy_sysid.live.plain_messages import ArrayMessage, StatusMessage, topic_of
+from xy_sysid.live.status_values import RATE, REFERENCE, SECONDS, WATCHED, number, units_of
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.units import USUAL, Units
+from xy_sysid.units import Units
 
 LOST = 4.0  # s without a message or an entry in the graph after which a node is called lost
 HISTORY = 2000  # resonance estimates kept for each axis
@@ -163,15 +164,11 @@ class TopicsState:
 
     def rate(self, axis: str) -> float:
         """Sampling rate in Hz, 0 while it is not known."""
-        try:
-            return float(self.values(f"axis {axis}").get("sampling rate (Hz)", "0"))
-        except ValueError:
-            return 0.0
+        return number(self.values(f"axis {axis}"), RATE, 0.0)
 
     def units(self, name: str) -> Units:
         """Units of input and output from a status: an axis (identifier), or the excitation."""
-        told = self.values(name)
-        return Units(told.get("input unit", USUAL.input), told.get("output unit", USUAL.output))
+        return units_of(self.values(name))
 
     def driving(self) -> bool:
         """True if the excitation reports that it drives."""
@@ -192,10 +189,8 @@ class TopicsState:
 
     def _track(self, axis: str, status: StatusMessage) -> None:
         values = dict(status.values)
-        try:
-            seconds = float(values["seconds of data (s)"])
-            now, reference = float(values["resonance watched (Hz)"]), float(values["resonance reference (Hz)"])
-        except (KeyError, ValueError):
+        seconds, now, reference = (number(values, name) for name in (SECONDS, WATCHED, REFERENCE))
+        if math.isnan(seconds + now + reference):
             return
         past = self.resonances.setdefault(axis, deque(maxlen=HISTORY))
         if past and seconds < past[-1].seconds:

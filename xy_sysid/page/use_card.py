@@ -8,6 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
+from xy_sysid.live.status_values import METRES
 from xy_sysid.page.beside import OneCommand
 from xy_sysid.page.buttons import heeded
 from xy_sysid.page.downloads import plain_name
@@ -64,7 +65,7 @@ class UseCard:
         return {axis: document for axis, document in found.items() if document and document.get("model")}
 
     def _write(self, values: dict[str, str]) -> None:
-        rows = [(key.removesuffix(" (m)"), f"{1e6 * float(value):.3g} um rms") for key, value in values.items() if key.endswith(" (m)")]
+        rows = [(key.removesuffix(METRES), f"{1e6 * float(value):.3g} um rms") for key, value in values.items() if key.endswith(METRES)]
         if rows != self._shown:
             self._shown = rows
             self._errors.clear()

@@ -14,7 +14,8 @@ from xy_sysid.fitting import Fit, Structure, identify, lls, nllsfdi
 from xy_sysid.fitting.choose_orders import Choice
 from xy_sysid.fitting.of_recording import AxisEstimate, estimate, with_orders
 from xy_sysid.fitting.structure import structure_from
-from xy_sysid.live.fitter import LIGHT_DAMPING, watched
+from xy_sysid.linear.transfer_function import LIGHT_DAMPING
+from xy_sysid.live.fitter import watched
 from xy_sysid.report.signals import Excitation, Motion, excitation, motion
 from xy_sysid.response.estimate import Estimate
 from xy_sysid.response.frf import FrequencyResponse

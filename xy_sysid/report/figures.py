@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from xy_sysid.fitting import Fit
 from xy_sysid.fitting.model_band import model_band
-from xy_sysid.report.parts import band, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
+from xy_sysid.report.parts import aligned, band, bounded, broken, decibel, frequency_axis, outline, phase_of, plain, positive, rows, turns, unbroken
 from xy_sysid.report.signals import Excitation, Motion
 from xy_sysid.report.theme import DRIFT, METHODS, axis_colour, fade
 from xy_sysid.response.frf import Z95, FrequencyResponse
@@ -86,16 +86,10 @@ def response_figure(responses: Mapping[str, FrequencyResponse]) -> go.Figure:
     for number, (axis, frf) in enumerate(responses.items()):
         lines = frf.select(frf.trusted) if bool(np.any(frf.trusted)) else frf
         colour = axis_colour(number)
-        part = Z95 * np.where(np.isfinite(lines.sigma), lines.sigma, 0.0) / np.sqrt(2) / np.abs(lines.response)
-        phase = phase_of(lines.response)
-        phases.append(phase)
+        curves, pieces = bounded(lines.response, lines.sigma, frf.output_unit), unbroken(lines.frequency)
+        phases.append(curves[1][0])
         spans.append(lines.frequency)
-        with np.errstate(invalid="ignore"):
-            turn = np.degrees(np.arcsin(np.minimum(part, 1.0)))
-        level = decibel(lines.response, frf.output_unit)
-        down = 20 * np.log10(np.maximum(1 - part, 1e-3))
-        for row, middle, low, high in ((1, level, level + down, level + 20 * np.log10(1 + part)), (2, phase, phase - turn, phase + turn)):
-            pieces = unbroken(lines.frequency)
+        for row, (middle, low, high) in enumerate(curves, start=1):
             if bool(np.any(frf.trusted)):
                 band(figure, row, outline(pieces, lines.frequency, low, high), colour, axis, f"95 % band, {plain(axis)}" if row == 1 else "")
             figure.add_scatter(
@@ -165,8 +159,7 @@ def fit_figure(frf: FrequencyResponse, fits: Mapping[str, Fit]) -> go.Figure:
     )  # fmt: skip
     for name, fit in fits.items():
         line = {"color": METHODS[name], "width": 1.8, "dash": DASHES[name]}
-        phase = phase_of(fit.response)
-        phase = phase + 360 * np.round(np.median(reference - phase) / 360)
+        phase = aligned(phase_of(fit.response), reference)
         phases.append(phase)
         error = 100 * np.abs((fit.measured - fit.response) / fit.measured)
         if name == UNCERTAIN:

@@ -11,12 +11,16 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
+from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from xy_sysid.report.theme import ROW, fade, template
-from xy_sysid.response.frf import ComplexArray
+from xy_sysid.response.frf import Z95, ComplexArray
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import readable
+
+Bounded = tuple[FloatArray, FloatArray, FloatArray]
+"""A curve, and the lower and upper end of its band."""
 
 GAP = 2.5  # a curve is interrupted where the spacing exceeds this multiple of the usual line spacing
 
@@ -35,6 +39,19 @@ def decibel(response: ComplexArray, output_unit: str) -> FloatArray:
 def phase_of(response: ComplexArray) -> FloatArray:
     """Unwrapped phase in degrees."""
     return np.asarray(np.degrees(np.unwrap(np.angle(response))), dtype=np.float64)
+
+
+def aligned(phase: FloatArray, reference: FloatArray, lines: NDArray[np.bool_] | slice = slice(None)) -> FloatArray:
+    """The phase in degrees, moved by full turns so that it is nearest to a reference, in the median over these lines."""
+    return np.asarray(phase + 360 * np.round(np.median((reference - phase)[lines]) / 360), dtype=np.float64)
+
+
+def bounded(response: ComplexArray, sigma: FloatArray, output_unit: str) -> tuple[Bounded, Bounded]:
+    """Magnitude in dB and phase in degrees of a measured response with the 95 % band of each line, of no width where sigma is unknown."""
+    level, phase = decibel(response, output_unit), phase_of(response)
+    part = Z95 * np.where(np.isfinite(sigma), sigma, 0.0) / np.sqrt(2) / np.maximum(np.abs(response), 1e-300)
+    turn = np.degrees(np.arcsin(np.minimum(part, 1.0)))
+    return (level, level + 20 * np.log10(np.maximum(1 - part, 1e-3)), level + 20 * np.log10(1 + part)), (phase, phase - turn, phase + turn)
 
 
 def rows(number: int, *, shared: bool, gap: float, heights: list[float] | None = None, mode: str = "light") -> go.Figure:
@@ -81,6 +98,12 @@ def unbroken(frequency: FloatArray) -> list[slice]:
     steps = np.diff(frequency)
     cuts = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else np.array([], dtype=np.int64)
     return [slice(a, b) for a, b in itertools.pairwise([0, *cuts.tolist(), frequency.size])]
+
+
+def true_runs(flags: NDArray[np.bool_]) -> list[slice]:
+    """Slices of consecutive lines for which a flag is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def broken(pieces: list[slice], values: FloatArray) -> FloatArray:

@@ -17,13 +17,13 @@ from xy_sysid.report import story_progress
 from xy_sysid.report.coupling import coupling_figure
 from xy_sysid.report.figures import coherence_figure, response_figure
 from xy_sysid.report.offline import picture
-from xy_sysid.report.parts import decibel, phase_of, plain
+from xy_sysid.report.parts import aligned, decibel, phase_of, plain
 from xy_sysid.report.story_parts import drawing
 from xy_sysid.report.theme import FLOOR
 from xy_sysid.response.coupling import Coupling
 from xy_sysid.response.frf import FrequencyResponse
 from xy_sysid.samples.recording import Recording, Run, one_run
-from xy_sysid.settings import IdentifierSettings
+from xy_sysid.settings import LEAST_COHERENCE
 
 COLOURS = ("#d1495b", "#2e8b57", "#7b5ea7", "#c77d0a", "#00798c")
 DASHES = ("dash", "solid", "dot", "dashdot", "longdash")
@@ -45,8 +45,7 @@ def bode(frf: FrequencyResponse, *others: FrequencyResponse | AnyModel) -> go.Fi
     reference = phase_of(lines.response)
     for number, model in enumerate(models):
         response = through_window(model.tf, lines, model.hold if isinstance(model, LinearModel) else "zoh")
-        phase = phase_of(response)
-        phase = phase + 360 * np.round(np.median(reference - phase) / 360)
+        phase = aligned(phase_of(response), reference)
         name = plain(model.label)
         line = {"color": COLOURS[number % len(COLOURS)], "width": 1.8, "dash": DASHES[number % len(DASHES)]}
         for row, values in ((1, decibel(response, frf.output_unit)), (2, phase)):
@@ -58,7 +57,7 @@ def bode(frf: FrequencyResponse, *others: FrequencyResponse | AnyModel) -> go.Fi
 
 def coherence(frf: FrequencyResponse) -> go.Figure:
     """Coherence of every line; lines that no fit uses are small crosses."""
-    return picture(coherence_figure({frf.origin.axis or "measured": frf}, IdentifierSettings().min_coherence))
+    return picture(coherence_figure({frf.origin.axis or "measured": frf}, LEAST_COHERENCE))
 
 
 def coupling(found: Coupling) -> go.Figure:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from xy_sysid.report.parts import band, broken, frequency_axis, outline, plain, turns
+from xy_sysid.report.parts import band, broken, frequency_axis, outline, plain, true_runs, turns
 from xy_sysid.report.story_parts import SMALL, Document, drawing, grey, legend_name, nothing, pictured, row
 from xy_sysid.report.theme import FAILS, MEASURED, MODEL, fade
 from xy_sysid.report.words import number
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.settings import LEAST_COHERENCE
 from xy_sysid.units import over, readable
-
-LEAST = 0.3  # coherence of a trusted line
 
 
 def bode(document: Document, step: int | None = None, mode: str = "light") -> go.Figure:
@@ -24,7 +23,7 @@ def bode(document: Document, step: int | None = None, mode: str = "light") -> go
     scale, unit = readable(document["units"]["output"])
     lift = 20 * np.log10(scale)
     frequency, trusted = row(measured["frequency"]), np.array(measured["trusted"], dtype=bool)
-    pieces, seen = stretches(trusted), between(trusted)
+    pieces, seen = true_runs(trusted), between(trusted)
     figure = drawing([0.58, 0.42], 420, mode)
     curves = (
         (1, "magnitude_db", "magnitude_low_db", "magnitude_high_db", lift),
@@ -64,7 +63,7 @@ def coherence(document: Document, step: int | None = None, mode: str = "light") 
     measured = document["measured"]["frequency_response"]
     frequency, values, trusted = row(measured["frequency"]), row(measured["coherence"]), np.array(measured["trusted"], dtype=bool)
     figure = drawing([1.0], SMALL, mode)
-    pieces = stretches(trusted)
+    pieces = true_runs(trusted)
     if pieces:
         figure.add_scatter(
             x=broken(pieces, frequency),
@@ -77,7 +76,7 @@ def coherence(document: Document, step: int | None = None, mode: str = "light") 
         )
     if not bool(trusted.all()):
         figure.add_scatter(x=frequency[~trusted], y=values[~trusted], mode="markers", marker=grey(), name="not trusted", row=1, col=1)
-    figure.add_hline(y=LEAST, line={"color": FAILS, "width": 1, "dash": "dot"}, row=1, col=1)
+    figure.add_hline(y=LEAST_COHERENCE, line={"color": FAILS, "width": 1, "dash": "dot"}, row=1, col=1)
     figure.update_yaxes(title_text="coherence", range=[-0.03, 1.05], row=1, col=1)
     figure.update_layout(showlegend=not bool(trusted.all()))
     frequency_axis(figure, 1, [frequency])
@@ -112,12 +111,6 @@ def poles_zeros(document: Document, step: int | None = None, mode: str = "light"
     figure.update_xaxes(title_text="real (rad/s)", range=[1.15 * left - 0.05 * edge, max(1.3 * right, 0.12 * edge)], row=1, col=1)
     figure.update_yaxes(title_text="imaginary (rad/s)", range=[-1.15 * edge, 1.15 * edge], row=1, col=1)
     return figure
-
-
-def stretches(trusted: np.ndarray) -> list[slice]:
-    """Slices of consecutive trusted lines."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], trusted.astype(np.int8), [0]))))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def between(trusted: np.ndarray) -> slice:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from xy_sysid.report.parts import band, broken, frequency_axis, outline, plain, positive, turns
-from xy_sysid.report.story_curves import between, stretches
+from xy_sysid.report.parts import band, broken, frequency_axis, outline, plain, positive, true_runs, turns
+from xy_sysid.report.story_curves import between
 from xy_sysid.report.story_parts import Document, drawing, floor_line, nothing, pictured, ratio_axis, row, words
 from xy_sysid.report.theme import axis_colour
 from xy_sysid.samples.block import FloatArray
@@ -61,7 +61,7 @@ def _measured(figure: go.Figure, entry: Entry, colour: str, turn: float) -> Floa
     measured = entry.document["measured"]["frequency_response"]
     lift = _lift(entry)
     frequency, trusted = row(measured["frequency"]), np.array(measured["trusted"], dtype=bool)
-    pieces = stretches(trusted) or [slice(0, frequency.size)]
+    pieces = true_runs(trusted) or [slice(0, frequency.size)]
     for at, name, low, high, up in (
         (1, "magnitude_db", "magnitude_low_db", "magnitude_high_db", lift),
         (2, "phase_deg", "phase_low_deg", "phase_high_deg", turn),

@@ -17,6 +17,7 @@ from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.response.spectra import Spectra
 from xy_sysid.response.windows import WindowShape, blur_kernel, error_correlation
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.settings import LEAST_COHERENCE
 
 NOISE_SMOOTHING = 2  # lines to each side over which the noise power is averaged: it stabilises sigma if windows are few
 PERIODIC_COHERENCE = 0.9  # a line of a periodic input has a high coherence; a low one is feedback or noise between the excited lines
@@ -59,7 +60,7 @@ class H1Options:
     differenced: bool
     periodic: bool = False
     band: tuple[float, float] = (0.0, np.inf)
-    min_coherence: float = 0.3
+    min_coherence: float = LEAST_COHERENCE
     units: tuple[str, str] = ("V", "m")
     repeated: float = PERIODIC_COHERENCE
     rate_error: float = 0.0

@@ -15,7 +15,8 @@ from xy_sysid.response.h1 import H1Options, frequency_response
 from xy_sysid.response.local_polynomial import LocalTransformer, RunningLocal, added, local_response, of_window
 from xy_sysid.response.spectra import RunningSpectra, State, Transformer
 from xy_sysid.response.windows import Window, WindowShape
-from xy_sysid.samples.block import FloatArray
+from xy_sysid.samples.block import FloatArray, StreamName
+from xy_sysid.samples.pairing import QUANTITIES
 
 Stretch = tuple[int, FloatArray, FloatArray, FloatArray]
 """Counter of the first sample, reference (n,) or (0,), input (n,), output (n,) of a gap-free stretch."""
@@ -55,6 +56,16 @@ class ResponseMethod:
     estimate: Callable[[Any, WindowShape, float, H1Options], FrequencyResponse]
     windows: Callable[[Any], float]
     note: str = ""
+
+    @property
+    def plain(self) -> bool:
+        """True if it divides averaged spectra of output and input, with nothing else: H1."""
+        return self.tapered and not self.reference
+
+    @property
+    def streams(self) -> tuple[StreamName, ...]:
+        """The streams that it needs."""
+        return (*QUANTITIES, "reference") if self.reference else QUANTITIES
 
     def shape(self, window: str, length: int, overlap: float) -> WindowShape:
         """The shape of the method's windows."""

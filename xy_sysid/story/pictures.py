@@ -36,7 +36,6 @@ FAINTEST = 0.03  # of a magnitude: lower end of its band, so that it has a logar
 SMOOTH = 0.002  # s, over which an error is averaged to find the largest
 SETTLING = 0.5  # s in which the simulation may still start from rest
 TOP = 0.45  # of the sampling rate
-COHERENT = 0.3  # least coherence of a trusted point
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,9 +246,7 @@ def _response(data: AxisData, position: FloatArray) -> FrequencyResponse:
     firsts = np.cumsum([0, *(-(-(run.stop - run.start) // shape.hop) * shape.hop for run in data.runs)])  # each starts with a window
     runs = [(int(first), data.voltage[run], position[run]) for first, run in zip(firsts, data.runs, strict=False)]
     spectra = batch_spectra(runs, shape, differenced=True)
-    return frequency_response(
-        spectra, shape, data.sampling_rate, H1Options(differenced=True, band=(0.0, TOP * data.sampling_rate), min_coherence=COHERENT)
-    )
+    return frequency_response(spectra, shape, data.sampling_rate, H1Options(differenced=True, band=(0.0, TOP * data.sampling_rate)))
 
 
 def _points(data: AxisData) -> tuple[FrequencyResponse, FloatArray, NDArray[np.int64]]:
