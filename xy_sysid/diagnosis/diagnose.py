@@ -18,7 +18,7 @@ from xy_sysid.diagnosis.unmodelled import unmodelled_force
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import AxisData, one_stretch
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.hypotheses.criteria import AT_FLOOR
+from xy_sysid.hypotheses.criteria import AT_FLOOR, KNOWN, STOPPED, UNSURE
 from xy_sysid.hypotheses.enough_data import prepared
 from xy_sysid.hypotheses.input_noise import input_noise
 from xy_sysid.hypotheses.refusal import at_bound
@@ -92,7 +92,7 @@ def judged(data: AxisData, found: Answer, library: Library) -> Answer:
     sentence += words.of_one_stretch(found, seconds)
     if found.stopped:
         sentence += " The search was stopped by its budget."
-        confidence *= 0.8
+        confidence *= STOPPED
     found = replace(
         found,
         verdict=verdict,
@@ -155,7 +155,7 @@ def _confidence(data: AxisData, found: Answer, named: GreyboxFit) -> float:
     likely = math.prod(likelihood(library, name, values) for name, values in found.final.model.effects if name in names)
     sure = (1.0 - doubt) * size / (size + 1.0) * likely
     doubtful = any(_undetermined(data, fit, name) for fit in (named, found.final) for name in names)
-    return min(sure, 0.5) if doubtful or _could_be(found.untried, names, library) else sure
+    return min(sure, UNSURE) if doubtful or _could_be(found.untried, names, library) else sure
 
 
 def _undetermined(data: AxisData, fit: GreyboxFit, name: str) -> bool:
@@ -167,9 +167,9 @@ def _undetermined(data: AxisData, fit: GreyboxFit, name: str) -> bool:
 
 
 def _is_known(low: float, high: float) -> bool:
-    """An interval does not hold zero, and its ends differ by a factor of four at most."""
+    """An interval does not hold zero, and its ends differ by the factor KNOWN at most."""
     near, far = sorted((abs(low), abs(high)))
-    return low * high > 0.0 and math.isfinite(far) and far <= 4.0 * near
+    return low * high > 0.0 and math.isfinite(far) and far <= KNOWN * near
 
 
 def _part_hidden(left: float, trusted: float) -> float:

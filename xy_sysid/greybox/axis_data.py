@@ -92,6 +92,11 @@ class AxisData:
         return not np.array_equal(self.held_out.begins, self.fitted.begins)
 
     @property
+    def longest_delay(self) -> float:
+        """s: a quarter of the data of the first stage."""
+        return self.first / self.sampling_rate / 4.0
+
+    @property
     def noise_floor(self) -> float:
         """The smallest error that the data can show: encoder noise and the tolerated part of the motion, m/s rms."""
         return self.layout.rms(self.floor.power)

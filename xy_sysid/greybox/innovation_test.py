@@ -17,7 +17,7 @@ from xy_sysid.effects import Effect, Scene
 from xy_sysid.effects._contract import Companions, FilterFit, OneStep
 from xy_sysid.effects._scene import Guess
 from xy_sysid.greybox.axis_data import AxisData
-from xy_sysid.greybox.one_step import as_companions, companions
+from xy_sysid.greybox.one_step import SETTLING, as_companions, companions
 from xy_sysid.greybox.score_test import Projected, Trace, best_trace
 from xy_sysid.greybox.start_rigid import mean_velocity_filter
 from xy_sysid.samples.block import FloatArray
@@ -75,7 +75,7 @@ def traces(data: AxisData, model: AxisModel, effect: Effect, found: FilterFit, e
     own, fs, n = _Filter.of(data, model, effect, found), data.sampling_rate, data.first
     voltage, position, against = own.undone(own.numbers)
     here = own.innovation(voltage, position, against)
-    skip = min(int(0.5 * fs), n // 4)
+    skip = min(int(SETTLING * fs), n // 4)
     scene = Scene(
         sampling_rate=fs,
         gain=found.base[0],

@@ -23,6 +23,9 @@ from xy_sysid.jit import on_all_cores
 from xy_sysid.samples.block import FloatArray
 
 TRUSTED = 0.25  # relative difference from the expected decrease below which no new derivatives are computed; with 0.75 long valleys take longer
+EASED = 0.2  # factor of the damping after a step that succeeded
+HIGHEST_DAMPING = 1e6  # a round whose steps are shorter has ended
+EXPONENT = 700.0  # where an exponential ends
 STEP = 1e-4  # of a logarithm, or of a parameter's scale: far above rounding errors, small enough for linearity
 
 
@@ -57,7 +60,7 @@ class Scale:
 
     def outer(self, inner: FloatArray) -> FloatArray:
         """Parameters, kept within their bounds."""
-        values = np.where(self.positive, np.exp(np.where(self.positive, np.clip(inner, -700.0, 700.0), 0.0)), inner * self.unit)
+        values = np.where(self.positive, np.exp(np.where(self.positive, np.clip(inner, -EXPONENT, EXPONENT), 0.0)), inner * self.unit)
         return np.asarray(np.clip(values, self.low, self.high))
 
 
@@ -236,7 +239,7 @@ def _round(simulated: _Simulations, here: _Point, weight: FloatArray, schedule: 
             expected = -float(2.0 * slope @ taken + taken @ normal @ taken)
             exact = not abs(fall - expected) < TRUSTED * expected
             change = simulated.slopes(trial, error) if exact else _updated(here.change, taken, diagonal, error - here.error)
-            here, stale, damping = _Point(trial, error, change, exact), True, max(damping * 0.2, 1e-9)
+            here, stale, damping = _Point(trial, error, change, exact), True, max(damping * EASED, 1e-9)
             cost, settled = new, fall / cost < schedule.enough
             if settled:
                 return _Round(here, cost, normal, True)
@@ -244,7 +247,7 @@ def _round(simulated: _Simulations, here: _Point, weight: FloatArray, schedule: 
             here, stale = replace(here, change=simulated.slopes(here.inner, here.error), exact=True), True
         else:
             damping *= 10.0
-            if damping > 1e6:
+            if damping > HIGHEST_DAMPING:
                 return _Round(here, cost, normal, True)
     return _Round(here, cost, normal)
 

@@ -78,7 +78,7 @@ def problem(data: AxisData, model: AxisModel, early: bool) -> FitProblem:
     free = np.full(later.size, np.inf)
     scale = Scale(
         np.array([-np.inf, 0.0, 1e-2, *(item.low for item in items), *-free]),
-        np.array([np.inf, max(data.first / data.sampling_rate / 4.0, model.delay), 1e5, *(item.high for item in items), *free]),
+        np.array([np.inf, max(data.longest_delay, model.delay), 1e5, *(item.high for item in items), *free]),
         np.array([False, False, True, *(item.positive for item in items), *np.zeros(free.size, dtype=np.bool_)]),
         np.array([abs(model.gain) or 1.0, 20.0 / data.sampling_rate, 1.0, *unit, *unit_later]),
     )

@@ -16,7 +16,7 @@ from xy_sysid.greybox.free_run import AxisData, GreyboxFit
 from xy_sysid.greybox.innovation_test import traces
 from xy_sysid.greybox.one_step import AT_NOISE, Others, companions, error_without, filter_fit
 from xy_sysid.greybox.score_test import Trace
-from xy_sysid.hypotheses.criteria import ALIKE, AT_FLOOR, LEAST, MOST_EFFECTS, OPTIMISM_AHEAD, SIZE
+from xy_sysid.hypotheses.criteria import ALIKE, AT_FLOOR, LEAST, LEAST_DRY, MOST_EFFECTS, OPTIMISM_AHEAD, SIZE
 from xy_sysid.hypotheses.refusal import none_of
 
 
@@ -184,4 +184,4 @@ def _start(trace: Trace, library: Library, found: FilterFit) -> tuple[str, tuple
     if not library[trace.effect].is_dry:
         return trace.effect, trace.values
     rest = trace.values[1:] if library[trace.effect].sum_of is None else (0.0,) * (len(trace.values) - 1)
-    return trace.effect, (max(*found.dry.values[:1], 1e-3), *rest)
+    return trace.effect, (max(*found.dry.values[:1], LEAST_DRY), *rest)

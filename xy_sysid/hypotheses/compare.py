@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.hypotheses.criteria import CHANCE, OVERLAP
+from xy_sysid.hypotheses.criteria import CHANCE, LARGEST, OVERLAP
 from xy_sysid.samples.block import FloatArray
 
 
@@ -72,10 +72,10 @@ def size(one: GreyboxFit, before: GreyboxFit) -> float:
     """
     force = force_explained(one, before)
     error = math.log(max(before.held_out_error, 1e-300) / max(one.held_out_error, 1e-300))
-    return max(force, math.expm1(min(2.0 * error, 50.0))) if force > 0.0 else force
+    return max(force, math.expm1(min(2.0 * error, LARGEST))) if force > 0.0 else force
 
 
 def force_explained(one: GreyboxFit, before: GreyboxFit) -> float:
     """The same for the unmodelled force alone: n nats over l lines in which it exceeds the floor are a factor exp(2 n / l) of its power."""
     nats = float(np.mean(before.scores) - np.mean(one.scores))
-    return math.expm1(min(max(2.0 * nats / max(before.forced, 1.0), -50.0), 50.0))
+    return math.expm1(min(max(2.0 * nats / max(before.forced, 1.0), -LARGEST), LARGEST))

@@ -10,7 +10,7 @@ import scipy
 
 from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON, AxisData, prepare_all
-from xy_sysid.hypotheses.criteria import CHANCE, FEWEST, STILL
+from xy_sysid.hypotheses.criteria import CHANCE, FEWEST, PARTS, SHORTEST, STILL, STRONGEST, TONE
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.units import USUAL, Units
 
@@ -80,13 +80,13 @@ def _moving(data: AxisData, begins: np.ndarray, about_mean: bool = True) -> int:
         parts = (data.velocity[start : start + length] for start in starts)
         return np.array([float(np.std(part) if about_mean else np.sqrt(np.mean(part**2))) for part in parts])
 
-    return int(np.sum(sizes(begins) > STILL * float(np.quantile(sizes(every), 0.9))))
+    return int(np.sum(sizes(begins) > STILL * float(np.quantile(sizes(every), STRONGEST))))
 
 
 def _tones(voltage: FloatArray) -> float:
     """Least number of tones of the input: lines of its spectrum within 50 dB of the largest, divided by the width of one tone."""
     power = np.abs(np.fft.rfft((voltage - voltage.mean()) * scipy.signal.get_window("blackmanharris", voltage.size))) ** 2
-    return float(np.sum(power > 1e-5 * float(power.max()))) / 8.0  # the window's main lobe; its side lobes are 92 dB down
+    return float(np.sum(power > TONE * float(power.max()))) / 8.0  # the window's main lobe; its side lobes are 92 dB down
 
 
 def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) -> tuple[float, float]:
@@ -96,9 +96,9 @@ def _coherence(sampling_rate: float, voltage: FloatArray, position: FloatArray) 
     at least.
     """
     best = (0.0, 1.0)
-    for part in (16, 8):
+    for part in PARTS:
         length = int(2 ** np.floor(np.log2(voltage.size / part)))
-        if length < 32:
+        if length < SHORTEST:
             continue
         with np.errstate(all="ignore"):  # of a line that holds nothing there is none
             frequency, value = scipy.signal.coherence(voltage[:-1], np.diff(position), sampling_rate, nperseg=length)

@@ -10,15 +10,15 @@ from xy_sysid.axis.model import Library
 from xy_sysid.effects import Effect, Parameter
 from xy_sysid.greybox.axis_data import AxisData
 from xy_sysid.greybox.free_run import GreyboxFit
-from xy_sysid.hypotheses.criteria import FEWEST
+from xy_sysid.hypotheses.criteria import AT_BOUND, BEYOND, FEWEST, HIGHEST_MODE
 
 
 def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozenset[str] = frozenset()) -> str:
     """Why a fit does not count, whatever its error: in words, or empty. given: effects that a user asked for, which are not checked."""
-    low, high = data.sampling_rate * 0.0, 0.4 * data.sampling_rate
+    low, high = data.sampling_rate * 0.0, HIGHEST_MODE * data.sampling_rate
     excited = data.layout.edges()[:-1][data.floor.excited]
     if excited.size:
-        low, high = float(excited[0]), min(high, 1.5 * float(data.layout.edges()[1:][data.floor.excited][-1]))
+        low, high = float(excited[0]), min(high, BEYOND * float(data.layout.edges()[1:][data.floor.excited][-1]))
     for name, values in found.model.effects:
         if name in given:
             continue
@@ -37,8 +37,7 @@ def refusal(data: AxisData, library: Library, found: GreyboxFit, given: frozense
                 outside = [hertz for hertz in (value, resonance(effect, values)) if not low <= hertz <= high]
                 if outside:
                     return f"{name}: a mode at {outside[0]:.3g} Hz, outside the excited band ({low:.3g} to {high:.3g} Hz)"
-    limit = data.first / data.sampling_rate / 4.0
-    if found.model.delay >= 0.99 * limit:
+    if found.model.delay >= AT_BOUND * data.longest_delay:
         return f"time_delay: {found.model.delay:.3g} s is at its bound"
     return ""
 
