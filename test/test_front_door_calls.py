@@ -222,6 +222,15 @@ def test_an_answer_prints_its_sentence_the_falling_error_and_the_parameters(run:
     assert [row[0] for row in refined.table] == ["rigid", "coulomb_friction"] and str(refined).startswith(str(refined.table))
 
 
+def test_every_result_prints_a_sentence_and_a_short_table(run: xy.Run, model: xy.LinearModel) -> None:
+    """The output of ``print`` for comparisons, checks, paired tests and controllers."""
+    axis = xy.PhysicalModel(xy.AxisModel(0.1, 1e-3, 50.0))
+    results: list[Any] = [xy.compare(run, axis), xy.validate(run, axis), xy.better(run, axis, model), xy.use(axis, run)]
+    for result, head in zip(results, ("place", "quantity", "quantity", "gain"), strict=True):
+        sentence, _, table = str(result).partition("\n\n")
+        assert sentence in repr(result) and table.startswith(head) and table == str(result.table) and 2 <= len(result.table) <= 20
+
+
 def test_a_table_goes_to_pandas_markdown_and_latex() -> None:
     """Numbers are numbers in a frame; special characters of other formats are escaped."""
     table = Table(("name", "size (%)"), (("a_b|c", 12.5), ("d", None)))

@@ -23,6 +23,7 @@ from xy_sysid.greybox.free_run import EPSILON
 from xy_sysid.linear.simulate import simulate
 from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.tables import Table, with_sentence
 from xy_sysid.units import USUAL, Units, motion, moved, told
 
 PlaceKind = Literal["frequency", "speed", "direction", "position", "amplitude", "time"]
@@ -79,6 +80,16 @@ class Comparison:
 
     def __repr__(self) -> str:
         return f"<Comparison: {self.sentence}>"
+
+    @property
+    def table(self) -> Table:
+        """Each place where the model fails, worst first: its range, and the error there in multiples of the noise floor."""
+        rows = ((place.kind, place.low, place.high, place.unit, place.error_over_floor) for place in self.places)
+        return Table(("place", "from", "to", "unit", "error over floor"), tuple(rows))
+
+    def __str__(self) -> str:
+        """The sentence and the table."""
+        return with_sentence(self.sentence, self.table)
 
     @property
     def sentence(self) -> str:
