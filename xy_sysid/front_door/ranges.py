@@ -11,7 +11,8 @@ import numpy as np
 
 from xy_sysid.samples.recording import Recording, Run
 
-LARGEST = 1e100  # of any number and sample: its square and its cube still are numbers
+LARGEST = 1e100  # of any number: its square and its cube still are numbers
+LARGEST_SAMPLE = 1e50  # a fit multiplies up to five of them
 LARGEST_FLOAT = float(np.finfo(np.float64).max)
 LONGEST_NAME, LONGEST_PATH = 255, 4096  # bytes that file systems take
 ABOVE = 5e-324  # the smallest positive number: zero is outside the range
@@ -63,7 +64,7 @@ def outside(value: Any, bounds: Range, usual: Any, a_path: bool) -> tuple[object
         return None if _is_text(str(value), a_path) else ("text with null bytes, or too long", "text that can be the name of a file")
     if isinstance(value, Run | Recording):
         sizes = [max(float(np.max(part, initial=0.0)), -float(np.min(part, initial=0.0))) for part in (value.voltage, value.position)]
-        return (f"samples up to {max(sizes):.3g} in size", f"up to {LARGEST:g}") if max(sizes) > LARGEST else None
+        return (f"samples up to {max(sizes):.3g} in size", f"up to {LARGEST_SAMPLE:g}") if max(sizes) > LARGEST_SAMPLE else None
     parts = value if isinstance(value, list | tuple) and len(value) <= LONGEST_PATH else ()
     return next((found for part in parts if (found := outside(part, bounds, usual, a_path)) is not None), None)
 
