@@ -116,8 +116,8 @@ def test_arrays_become_a_recording_whatever_they_come_in() -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ((0.0, [1.0], [1.0]), "sampling rate is 0.0; allowed: > 0 Hz"),
-        (("fast", [1.0], [1.0]), "sampling rate is 'fast'"),
+        ((0.0, [1.0], [1.0]), "sampling_rate of xy.Recording.from_arrays is 0.0; allowed: above 0, up to 1000000000 Hz"),
+        (("fast", [1.0], [1.0]), "sampling_rate of xy.Recording.from_arrays is str 'fast'; allowed: a number"),
         ((RATE, [1.0, 2.0], [1.0]), r"\(2,\) and \(1,\)"),
         ((RATE, ["a"], [1.0]), "voltage is list that is not an array of numbers"),
         ((RATE, [1.0, float("nan")], [1.0, 2.0]), "voltage is not finite in 1 of 2 values"),

@@ -38,6 +38,7 @@ when it is first used; all other modules may change.
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -149,6 +150,7 @@ def __getattr__(name: str) -> Any:
     elif name in _HOME:
         home = importlib.import_module(f"xy_sysid.{_HOME[name]}")
         _show_as_pictures(home)
+        _guard()
         value = getattr(home, name)
         if not isinstance(value, type):
             value = _calls().for_people(value, f"xy.{name}")
@@ -161,6 +163,14 @@ def __getattr__(name: str) -> Any:
 def _calls() -> Any:
     """The wrapped public function: a path or a run is converted, and a wrong type raises one line."""
     return importlib.import_module("xy_sysid.front_door.calls")
+
+
+def _guard() -> None:
+    """Constructors and methods of the public classes that are loaded check their arguments, in calls from outside this package."""
+    for name, home in _HOME.items():
+        kind = getattr(sys.modules.get(f"xy_sysid.{home}"), name, None)
+        if isinstance(kind, type):
+            _calls().guard(kind, f"xy.{name}")
 
 
 def _show_as_pictures(home: Any) -> None:

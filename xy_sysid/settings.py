@@ -21,6 +21,10 @@ Names = Annotated[list[str], BeforeValidator(lambda value: value.split(",") if i
 CHOICE = re.compile(r"'([^']*)'")
 SIGNS = {"ge": ">= ", "gt": "> ", "le": "<= ", "lt": "< ", "expected": ""}  # how a limit that was broken is told
 KINDS = {"list_type": "a list", "string_type": "text", "dict_type": "names with values", "model_type": "names with values"}  # of values in YAML
+SAID = dict.fromkeys(("fs", "sample_rate"), ("sampling_rate", "rate")) | {
+    "u": ("voltage", "input"),
+    "y": ("position", "output"),
+}  # names in other tools
 AnySettings = TypeVar("AnySettings", bound="Settings")
 
 
@@ -455,7 +459,7 @@ def changed(settings: AnySettings, values: Mapping[str, Any]) -> AnySettings:
 
 def unknown_name(name: str, known: Mapping[str, Any] | list[str], where: str) -> BadInput:
     """The error for an unknown name, with the nearest known one."""
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
+    near = [item for item in SAID.get(name, ()) if item in known] or difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
     act = f"Did you mean {near[0]!r}?" if near else "Remove it."
     return BadInput(f"{where}: name", repr(name), ", ".join(known), act)
 

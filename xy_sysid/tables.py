@@ -65,6 +65,11 @@ class Table:
         return [list(self.columns), *([_shown(cell) for cell in row] for row in self.rows)]
 
 
+def with_sentence(sentence: str, table: Table) -> str:
+    """A result as text: its sentence, and its table unless that is empty."""
+    return f"{sentence}\n\n{table}" if len(table) else sentence
+
+
 def _cells(tag: str, line: list[str]) -> str:
     return "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in line)
 

@@ -21,6 +21,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON
 from xy_sysid.greybox.floor import Floor, Windows, bands, encoder_noise, floor
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.tables import Table, with_sentence
 from xy_sysid.units import USUAL, Units, motion, moved, told
 
 PlaceKind = Literal["frequency", "speed", "direction", "position", "amplitude", "time"]
@@ -77,6 +78,16 @@ class Comparison:
 
     def __repr__(self) -> str:
         return f"<Comparison: {self.sentence}>"
+
+    @property
+    def table(self) -> Table:
+        """Each place where the model fails, worst first: its range, and the error there in multiples of the noise floor."""
+        rows = ((place.kind, place.low, place.high, place.unit, place.error_over_floor) for place in self.places)
+        return Table(("place", "from", "to", "unit", "error over floor"), tuple(rows))
+
+    def __str__(self) -> str:
+        """The sentence and the table."""
+        return with_sentence(self.sentence, self.table)
 
     @property
     def sentence(self) -> str:

@@ -17,6 +17,7 @@ from xy_sysid.errors import BadInput
 from xy_sysid.greybox.axis_data import EPSILON
 from xy_sysid.greybox.floor import Windows, bands, encoder_noise, floor
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.tables import Table, with_sentence
 from xy_sysid.units import USUAL, Units, bare, moved
 
 ABOVE = 1.2  # least power of one of the two errors, relative to the floor, for a change to matter
@@ -59,6 +60,17 @@ class Paired:
 
     def __repr__(self) -> str:
         return f"<Paired: {self.sentence}>"
+
+    @property
+    def table(self) -> Table:
+        """Both errors, the noise floor, and the ratio with its 95 % interval."""
+        sizes = (("error before", self.before), ("error after", self.after), ("noise floor", self.noise_floor))
+        rows = (*((name, size, None, None, self.unit) for name, size in sizes), ("after over before", self.ratio, self.low, self.high, ""))
+        return Table(("quantity", "value", "from", "to", "unit"), rows)
+
+    def __str__(self) -> str:
+        """The sentence and the table."""
+        return with_sentence(self.sentence, self.table)
 
     @property
     def better(self) -> bool | None:

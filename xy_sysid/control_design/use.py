@@ -30,6 +30,7 @@ from xy_sysid.control_design.worth import EDGE, WIDER, Predicted, Tracking, clea
 from xy_sysid.errors import BadInput
 from xy_sysid.linear.any_model import AnyModel
 from xy_sysid.samples.recording import Recording, Run, one_run
+from xy_sysid.tables import Table, with_sentence
 from xy_sysid.units import Sensed
 
 CALCULATION, LONGEST_CALCULATION = 1.0, 10.0  # controller periods from reading to writing: of most drives, and the most accepted
@@ -97,6 +98,16 @@ class Used:
         named = ", ".join(f"{item.name} {item.value:.4g}" for item in self.gains.items[:3])
         loop = f", bandwidth {self.feedback.bandwidth:.3g} Hz" if self.feedback is not None else ""
         return f"<Used: axis {self.axis}, {named}{loop}>"
+
+    @property
+    def table(self) -> Table:
+        """Each feedforward gain with its 95 % interval."""
+        rows = ((item.name, item.value, item.low, item.high, item.unit) for item in self.gains.items)
+        return Table(("gain", "value", "from", "to", "unit"), tuple(rows))
+
+    def __str__(self) -> str:
+        """The result in one line, and the table."""
+        return with_sentence(repr(self)[1:-1], self.table)
 
 
 def use(

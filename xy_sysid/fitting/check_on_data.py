@@ -13,6 +13,7 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.frf import ComplexArray, FrequencyResponse
 from xy_sysid.response.h1 import divisor
 from xy_sysid.samples.block import FloatArray
+from xy_sysid.tables import Table, with_sentence
 from xy_sysid.units import over, position_of, told
 
 AT_THE_FLOOR = 1.3  # rms residual in sigma up to which a model from other data counts as consistent with the noise
@@ -48,6 +49,22 @@ class ModelCheck:
 
     def __repr__(self) -> str:
         return f"<ModelCheck: {self.sentence}>"
+
+    @property
+    def table(self) -> Table:
+        """The residual and the noise floor, over all trusted lines."""
+        rows = (
+            ("relative error", 100.0 * self.relative_error, "%"),
+            ("noise floor", 100.0 * self.noise_floor, "%"),
+            ("residual, rms", self.rms_sigma, "sigma"),
+            ("residual, largest", self.worst_sigma, "sigma"),
+            ("frequency of the largest", self.worst_hz, "Hz"),
+        )
+        return Table(("quantity", "value", "unit"), rows)
+
+    def __str__(self) -> str:
+        """The sentence and the table."""
+        return with_sentence(self.sentence, self.table)
 
 
 def through_window(tf: TransferFunction, frf: FrequencyResponse, hold: Literal["zoh", "none"] = "zoh") -> ComplexArray:

@@ -30,7 +30,11 @@ def simulate(
     """
     if not 0.0 < duration <= 1e6:
         raise BadInput("duration", f"{duration} s", "above 0, up to 1e6 s", "Give seconds of data.")
-    table = table_of(machine, effects, hidden, seed)
+    build(AxisExcitation, excite, "simulate")
+    chosen = list(effects)
+    if hidden is not None and chosen:
+        raise BadInput("hidden", f"{hidden} together with effects", "one of them", "Leave one out.")
+    table = table_of(machine, chosen, hidden, seed)
     return drive(table, excitation(table, excite, seed), duration)
 
 

@@ -46,6 +46,9 @@ class TransferFunction:
     def __post_init__(self) -> None:
         if not self.delay >= 0.0 or self.delay == inf:
             raise BadInput("delay", f"{self.delay} s", ">= 0 s", "A causal model has no negative delay.")
+        if self.numerator.ndim != 1 or self.denominator.ndim != 1:
+            shapes = f"{self.numerator.shape} and {self.denominator.shape}"
+            raise BadInput("shape of numerator and denominator", shapes, "(m,) and (n,)", "Give the coefficients in falling powers.")
         if self.denominator.size == 0 or not np.any(self.denominator != 0):
             raise BadInput("denominator", "zero", "at least one coefficient that is not 0", "Give its coefficients in falling powers.")
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xy_sysid.samples.block import FloatArray
-from xy_sysid.samples.recording import Origin
+from xy_sysid.samples.recording import Origin, check_mask
 from xy_sysid.units import over
 
 ComplexArray = NDArray[np.complex128]
@@ -92,7 +92,8 @@ class FrequencyResponse:
         return f"<FrequencyResponse{told}: {lines}, {self.averages:.1f} averages, {over(self.output_unit, self.input_unit)}>"
 
     def select(self, lines: NDArray[np.bool_] | slice) -> FrequencyResponse:
-        """The response at some of its lines."""
+        """The response at some of its lines. Raises BadInput for a mask of another length."""
+        check_mask(lines, len(self))
         return replace(
             self,
             frequency=self.frequency[lines],

@@ -51,6 +51,11 @@ class Run:
     output_unit: str = "m"
     measured: Sensed = "position"
 
+    def __post_init__(self) -> None:
+        if self.voltage.ndim != 1 or self.voltage.shape != self.position.shape:
+            shapes = f"{self.voltage.shape} and {self.position.shape}"
+            raise BadInput("shape of voltage and position", shapes, "one and the same (n,)", "Give one value per sample in both.")
+
     def __len__(self) -> int:
         return int(self.voltage.shape[0])
 
@@ -150,8 +155,8 @@ class Recording:
         return OF[self.measured](self.input_unit, self.output_unit)
 
     def of_axes(self, axes: Sequence[str]) -> Recording:
-        """The recording with only these axes, in this order."""
-        places = [self.axes.index(axis) for axis in axes]
+        """The recording with only these axes, in this order. Raises BadInput for an unknown name."""
+        places = [self._column(axis) for axis in axes]
         reference = None if self.reference is None else self.reference[:, places]
         return replace(self, axes=tuple(axes), voltage=self.voltage[:, places], position=self.position[:, places], reference=reference)
 
@@ -218,7 +223,8 @@ class Recording:
         return [slice(a, b) for a, b in itertools.pairwise(bounds) if b > a]
 
     def only(self, rows: slice | NDArray[np.bool_]) -> Recording:
-        """Some of the samples; omitted ones between them become a gap."""
+        """Some of the samples; omitted ones between them become a gap. Raises BadInput for a mask of another length."""
+        check_mask(rows, len(self))
         return replace(
             self,
             seq=self.seq[rows],
@@ -230,10 +236,13 @@ class Recording:
 
     def axis(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Input and output of one axis, (n,) each; raises BadInput for an unknown name."""
-        if name not in self.axes:
-            raise BadInput("axis", repr(name), ", ".join(self.axes), "Choose one of these.")
-        column = self.axes.index(name)
+        column = self._column(name)
         return self.voltage[:, column], self.position[:, column]
+
+    def _column(self, axis: str) -> int:
+        if axis not in self.axes:
+            raise BadInput("axis", repr(axis), ", ".join(self.axes), "Choose one of these.")
+        return self.axes.index(axis)
 
     def run(self, axis: str) -> Run:
         """The longest stretch of one axis without a gap (the first if several are equal), without idle ends: no drive, no motion.
@@ -289,6 +298,12 @@ class Recording:
             output_unit=self.output_unit,
             measured=self.measured,
         )
+
+
+def check_mask(mask: slice | NDArray[np.bool_], count: int) -> None:
+    """Raises BadInput if a mask does not have one value for each of the ``count`` rows."""
+    if not isinstance(mask, slice) and mask.shape != (count,):
+        raise BadInput("shape of the mask", mask.shape, f"({count},)", "Give True or False for each.")
 
 
 def as_sensed(position: FloatArray, sampling_rate: float, measured: Sensed) -> FloatArray:
