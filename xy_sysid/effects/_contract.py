@@ -274,9 +274,8 @@ class Effect:
     family:      effects of one family replace one another
     special_of:  the effect of another family that becomes this one at certain values of its parameters
     order:       place among the effects of its category, in the direction of the signal
-    simulable:   False if free simulation cannot judge it
     refusal:     reason to reject values on a travel between two positions (m) although each is within its bounds; empty if there is none
-    one_step:    if not simulable, fits the effect by one-step prediction (see ``contact.Contact``)
+    one_step:    fits an effect that free simulation cannot judge, by one-step prediction (see ``contact.Contact``)
     sum_of:      other effects whose sum is the same law, if motor and table move together
     straight:    True for a force proportional to speed, with one factor for each direction: it needs no sub-steps
     angular:     True for a law of an angle: it replaces another law only if the position is in rad
@@ -304,7 +303,6 @@ class Effect:
     family: str = ""
     special_of: str = ""
     order: int = 0
-    simulable: bool = True
     one_step: OneStep | None = None
     refusal: Callable[[Sequence[float], tuple[float, float]], str] | None = None
     sum_of: Sum | None = None
@@ -315,6 +313,11 @@ class Effect:
     masks: tuple[str, ...] = ()
     suspects: tuple[str, ...] = ()
     mode_frequency: str = ""
+
+    @property
+    def simulable(self) -> bool:
+        """False if free simulation cannot judge it."""
+        return self.one_step is None
 
     def __post_init__(self) -> None:
         """Raises BadInput if the functions do not fit the category or use unknown argument names."""

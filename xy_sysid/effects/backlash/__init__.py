@@ -88,7 +88,6 @@ EFFECT = Effect(
     guesses=guesses,
     states=("apart", "table"),
     order=100,
-    simulable=False,
     one_step=Contact(),
     start_friction="coulomb_friction",
     masks=("amplifier_lag",),
