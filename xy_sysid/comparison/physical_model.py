@@ -12,7 +12,7 @@ from xy_sysid.linear.transfer_function import TransferFunction
 from xy_sysid.response.estimate import Estimate
 from xy_sysid.samples.block import FloatArray
 from xy_sysid.tables import Table
-from xy_sysid.units import USUAL, Units, moved
+from xy_sysid.units import USUAL, Units, listed, moved
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +54,12 @@ class PhysicalModel:
         names = [name for name in self.effects if not self.model.library[name].simulable]
         if not names:
             return ""
-        return f"a free simulation cannot follow {' and '.join(names)} (the contact is chaotic), so this error says little about the model"
+        return f"a free simulation cannot follow {listed(names)} (the contact is chaotic), so this error says little about the model"
 
     @property
     def label(self) -> str:
         """A short text for a legend."""
-        return f"rigid with {' and '.join(self.effects).replace('_', ' ')}" if self.effects else "rigid"
+        return f"rigid with {listed(self.effects).replace('_', ' ')}" if self.effects else "rigid"
 
     @property
     def table(self) -> Table:

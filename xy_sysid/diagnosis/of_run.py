@@ -36,8 +36,8 @@ def diagnose(
 
     data:   a run or several of one axis, or a recording of one axis with all its stretches, V and m
     library: with effects of your own (``files.effects.library``)
-    budget: s after which the best so far is said, if ``clock`` (for example ``time.process_time``) tells the time; without one the search
-            ends after a fixed amount of work, and the same data give the same answer however busy the machine is
+    budget: s of ``clock`` (for example ``time.process_time``) after which the search stops with its best set so far; without a clock it
+            stops after a fixed amount of work, so that the same data give the same answer on a busy computer too
     tolerance: part of the motion that a model may leave
     first:  effects of an earlier recording of this axis. If they explain the data down to the noise floor, and no simpler set does as well,
             no other set is tried
@@ -61,7 +61,7 @@ def refine(
 ) -> Answer:
     """Add effects, fit everything together, and see the error on held-out data fall: a step for the rigid base and one for each effect.
 
-    add:  effects to add first, in this order, unasked; auto: go on until nothing promises more; the rest as for ``diagnose``
+    add:  effects to add first, in this order; auto: True to go on as long as another effect lowers the error; the rest as for ``diagnose``
     Raises BadInput for too little data, or for a name that is unknown, in every model, or given twice.
     """
     return refined(data, (add,) if isinstance(add, str) else tuple(add), library, Effort(MOST_EFFECTS if auto else 0, budget, clock))

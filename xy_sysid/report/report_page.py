@@ -22,6 +22,7 @@ from xy_sysid.report.story_words import spoken
 from xy_sysid.report.tables import Table, coefficient_table, order_table, result_table
 from xy_sysid.report.words import quantity
 from xy_sysid.response.coupling import Coupling
+from xy_sysid.units import listed
 
 ABOUT = (
     "Recording, response and model of each axis, the places where the model fails, the missing effects, and the uncertainty of "
@@ -120,7 +121,7 @@ def _stands(one: AxisReport, library: Library) -> str:
     if one.story is None:
         return one.problem
     effects = one.story["ladder"][-1]["effects"] if one.story["ladder"] else []
-    return spoken(headline(one.story) + (f", with {' and '.join(effects)}" if effects else ""), library)
+    return spoken(headline(one.story) + (f", with {listed(effects)}" if effects else ""), library)
 
 
 def _told(one: AxisReport, library: Library) -> tuple[str, ...]:
@@ -135,7 +136,7 @@ def _told(one: AxisReport, library: Library) -> tuple[str, ...]:
         made += [story_words.verdict(story, library), story_words.size(story, one.speed)]
         made += [story_words.confidence(story), story_words.runner_up(story)]
     effects = story["ladder"][-1]["effects"] if story is not None and story["ladder"] else ()
-    alone = f"The linear fit alone, without {' and '.join(effects)}" if effects else "The linear fit"
+    alone = f"The linear fit alone, without {listed(effects)}" if effects else "The linear fit"
     made.append(captions.summary(one.study).replace(f"Axis {one.axis}: ", f"{alone}: ", 1))
     if one.verdicts is not None:
         failed = ", ".join(check.name.replace("_", " ") for check in one.verdicts.verdicts if not check.ok)

@@ -11,6 +11,7 @@ from xy_sysid.report.story_parts import AHEAD, Document, words
 from xy_sysid.report.tables import Table
 from xy_sysid.report.words import interval_text, number, quantity
 from xy_sysid.story.standing import nearer
+from xy_sysid.units import listed
 
 STANDARD_TOLERANCE = 1e-3
 
@@ -96,7 +97,7 @@ def size(story: Document, speed: float) -> str:
     text += f"; the noise floor is {quantity(float(last['noise_floor']), unit, 3)}."
     if last["effects"]:
         times = float(first["held_out_error"]) / max(float(last["held_out_error"]), 1e-300)
-        text += f" Without {' and '.join(words(name) for name in last['effects'])} its error was {quantity(float(first['held_out_error']), unit, 3)}"
+        text += f" Without {listed([words(name) for name in last['effects']])} its error was {quantity(float(first['held_out_error']), unit, 3)}"
         text += f", {number(times, 2)} times as much." if times >= 1.1 else "."
     return text
 
