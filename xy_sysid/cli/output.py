@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, Task, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress_bar import ProgressBar
 from rich.segment import Segment
 from rich.table import Table
 
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
 PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 POWER = re.compile("^·10")
 NARROW = 40  # least width of wrapped text, columns
-COMPILING = "compiling the effect laws, once on this machine: about 20 s"
+COMPILING = "compiling the effect laws, once on this machine"
+USUAL = 20.0  # s that it takes on a computer of 2024; longer ones end with a full bar
 TEXT = ("unit", "in words")  # columns with left-aligned text
 
 
@@ -130,22 +132,32 @@ def progress() -> Progress:
     return Progress(words, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=aside, transient=True, disable=not aside.is_terminal)
 
 
-def compiling() -> tuple[Callable[[], None], Callable[[], None]]:
-    """(function that shows that laws are being compiled, with a bar and the elapsed time; function that removes it).
+class _OfTime(BarColumn):
+    """The time that has passed, of the usual time: the compiler reports no progress."""
 
-    The bar shows no progress, because the compiler reports none. It may be shown above another bar.
+    def render(self, task: Task) -> ProgressBar:
+        return ProgressBar(total=USUAL, completed=min(task.fields["before"] + (task.elapsed or 0.0), USUAL), width=self.bar_width)
+
+
+def compiling() -> tuple[Callable[[], None], Callable[[], None]]:
+    """(function that shows that laws are being compiled, with a bar of the usual time; function that removes it).
+
+    The bar goes on where the last one ended. It may be shown above another bar.
     """
     shown: list[Progress] = []
+    before = [0.0]  # s of all earlier bars
 
     def begins() -> None:
-        columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
-        bar = Progress(*columns, console=aside, transient=True, disable=not aside.is_terminal)
-        bar.add_task(COMPILING, total=None)
+        words = TextColumn(f"{{task.description}}: about {USUAL:g} s", markup=False)
+        bar = Progress(words, _OfTime(), console=aside, transient=True, disable=not aside.is_terminal)
+        bar.add_task(COMPILING, total=None, before=before[0])
         bar.start()
         shown.append(bar)
 
     def ends() -> None:
-        shown.pop().stop()
+        bar = shown.pop()
+        before[0] += bar.tasks[0].elapsed or 0.0
+        bar.stop()
 
     return begins, ends
 
