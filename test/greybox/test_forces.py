@@ -47,7 +47,7 @@ def test_friction_is_not_taken_over_by_a_load(data: AxisData) -> None:
 
 
 def test_a_law_that_gives_no_number_takes_nothing_over(data: AxisData) -> None:
-    model = AxisModel(0.1, 1e-3, 100.0).with_effect("hardening_stiffness", (np.nan, 0.0)).with_effect("constant_load", (5.0,))
+    model = AxisModel(0.1, 1e-3, 100.0, (("hardening_stiffness", (np.nan, 0.0)), ("constant_load", (5.0,))))
     assert dict(force_moved_to_others(data, model, "constant_load").effects).keys() == {"hardening_stiffness"}
 
 

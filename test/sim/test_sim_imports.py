@@ -17,7 +17,8 @@ ADAPTERS = {
     "trajectory_node.py",
 }  # the ROS side of the machine: it also uses the common modules of nodes
 SIM = sorted((ROOT / "xy_sim").rglob("*.py"))
-CORE = sorted(path for path in (ROOT / "xy_sysid").rglob("*.py") if "cli" not in path.relative_to(ROOT / "xy_sysid").parts)
+ASKED_FOR = ROOT / "xy_sysid" / "front_door" / "simulated_recording.py"  # xy.simulate
+CORE = sorted(path for path in (ROOT / "xy_sysid").rglob("*.py") if "cli" not in path.relative_to(ROOT / "xy_sysid").parts and path != ASKED_FOR)
 
 
 def imported(path: Path) -> Iterator[str]:
@@ -39,7 +40,7 @@ def test_the_simulator_imports_no_physics_of_the_identification(path: Path) -> N
     assert {name for name in foreign if not any(name == module or name.startswith(f"{module}.") for module in shared)} == set()
 
 
-def test_no_module_of_the_identification_but_the_command_line_imports_the_simulator() -> None:
+def test_no_module_but_the_command_line_and_xy_simulate_imports_the_simulator() -> None:
     """xy_sysid cannot import the truth that it is compared with."""
     assert len(SIM) > 20
     assert len(CORE) > 3
