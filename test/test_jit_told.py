@@ -46,7 +46,7 @@ def test_a_bar_moves_while_laws_are_compiled_and_is_gone_after_it(monkeypatch: p
 
 
 def test_the_bar_goes_on_where_the_last_one_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Laws are compiled one after another, and the bar is of all of them."""
+    """One bar stands for all laws, which are compiled one after another."""
     monkeypatch.setattr(output, "aside", output.Terminal(file=io.StringIO(), force_terminal=True, width=100, legacy_windows=False))
     begun: list[Progress] = []
     monkeypatch.setattr(Progress, "start", lambda bar: begun.append(bar))
